@@ -1,0 +1,15 @@
+#version 460
+#extension GL_NV_ray_tracing : require
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+layout(set = 0, binding = 0) uniform accelerationStructureNV scene;
+layout(set = 0, binding = 1, std430) readonly buffer Input { float data[]; };
+layout(location = 0) rayPayloadInNV float payload;
+layout(location = 1) rayPayloadNV float inner;
+
+void main() {
+    double d = double(data[0]) * 3.0LF;
+    uint64_t k = uint64_t(gl_PrimitiveID) << 33;
+    inner = 0.0;
+    traceNV(scene, 0u, 0xffu, 0u, 0u, 0u, vec3(0.0), 0.001, vec3(0.0, 1.0, 0.0), 10.0, 1);
+    payload = float(d) + float(k >> 33) + inner;
+}

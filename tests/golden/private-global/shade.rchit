@@ -1,0 +1,16 @@
+#version 460
+#extension GL_NV_ray_tracing : require
+layout(set = 0, binding = 0) uniform accelerationStructureNV scene;
+layout(location = 0) rayPayloadInNV float payload;
+layout(location = 1) rayPayloadNV float inner;
+float depth = 1.0;
+
+void step_down() { depth += payload; }
+
+void main() {
+    step_down();
+    inner = depth;
+    traceNV(scene, 0u, 0xffu, 0u, 0u, 0u, vec3(0.0), 0.001, vec3(0.0, 1.0, 0.0), 10.0, 1);
+    step_down();
+    payload = inner * depth;
+}
