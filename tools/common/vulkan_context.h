@@ -110,6 +110,7 @@ class GpuTimer {
   private:
     const Context& context_;
     VkQueryPool pool_ = VK_NULL_HANDLE;
+    uint32_t pairs_ = 0;
 };
 
 }  // namespace rtc::tools
