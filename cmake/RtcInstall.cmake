@@ -1,0 +1,63 @@
+# `cmake --install`: headers, the two libraries, programs; find_package(rtc) with components compiler and runtime
+# (targets rtc::compiler, rtc::runtime), and pkg-config files rtc-compiler and rtc-runtime.
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+set(RTC_PACKAGE_DIR ${CMAKE_INSTALL_LIBDIR}/cmake/rtc)
+
+# One library as a component: exported target, headers, pkg-config file.
+function(rtc_install_component component target description)
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${component})
+  target_include_directories(${target} INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  install(TARGETS ${target} EXPORT rtc-${component}
+    COMPONENT ${component}
+    ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
+    LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}
+    RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  install(EXPORT rtc-${component} NAMESPACE rtc:: FILE rtc-${component}-targets.cmake
+    COMPONENT ${component} DESTINATION ${RTC_PACKAGE_DIR})
+  install(FILES ${PROJECT_SOURCE_DIR}/include/rtc/${component}.h ${PROJECT_SOURCE_DIR}/include/rtc/abi.h
+    COMPONENT ${component} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/rtc)
+
+  set(PC_NAME rtc-${component})
+  set(PC_DESCRIPTION "${description}")
+  get_target_property(PC_LIB ${target} OUTPUT_NAME)
+  if(NOT PC_LIB)
+    set(PC_LIB ${target})
+  endif()
+  get_target_property(type ${target} TYPE)
+  set(PC_CFLAGS "")
+  if(type STREQUAL "STATIC_LIBRARY" AND component STREQUAL "runtime")
+    set(PC_CFLAGS "-DRTR_STATIC")
+  endif()
+  configure_file(${PROJECT_SOURCE_DIR}/cmake/rtc.pc.in ${PROJECT_BINARY_DIR}/rtc-${component}.pc @ONLY)
+  install(FILES ${PROJECT_BINARY_DIR}/rtc-${component}.pc
+    COMPONENT ${component} DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+endfunction()
+
+set(RTC_INSTALLED "")
+if(TARGET rtcc)
+  rtc_install_component(compiler rtcc "Links ray tracing shaders into one Vulkan compute shader")
+  list(APPEND RTC_INSTALLED compiler)
+endif()
+if(TARGET rtc_runtime)
+  rtc_install_component(runtime rtc_runtime "VK_NV_ray_tracing's host side on plain Vulkan compute")
+  list(APPEND RTC_INSTALLED runtime)
+endif()
+
+foreach(program rtc rtc-info rtc-render rtc-run)
+  if(TARGET ${program})
+    install(TARGETS ${program} COMPONENT programs RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  endif()
+endforeach()
+
+if(RTC_INSTALLED)
+  configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/rtc-config.cmake.in ${PROJECT_BINARY_DIR}/rtc-config.cmake
+    INSTALL_DESTINATION ${RTC_PACKAGE_DIR} NO_SET_AND_CHECK_MACRO)
+  # Before 1.0 a minor version may change what a caller sees.
+  write_basic_package_version_file(${PROJECT_BINARY_DIR}/rtc-config-version.cmake COMPATIBILITY SameMinorVersion)
+  install(FILES ${PROJECT_BINARY_DIR}/rtc-config.cmake ${PROJECT_BINARY_DIR}/rtc-config-version.cmake
+    DESTINATION ${RTC_PACKAGE_DIR})
+  install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/README.md
+    DESTINATION ${CMAKE_INSTALL_DOCDIR} OPTIONAL)
+endif()
