@@ -1,0 +1,93 @@
+// Entering a level: the ray in the level's space and all that traversal
+// derives from it once instead of at every step. One copy serves the top
+// level, instances, and rays that resume.
+
+// Powers of two whose product with the largest |d| lies in [1, 2): rays with
+// extreme directions would overflow the reciprocals below. Ordinary rays keep
+// their bits and their t.
+const float RTC_DIRECTION_MIN = 9.31322574615e-10; // 2^-30
+const float RTC_DIRECTION_MAX = 1073741824.0; // 2^30
+
+void rtc_choose_scale() {
+    float largest = rtc_largest(rtc_ray_direction);
+    rtc_trav_t_down = 1.0;
+    rtc_trav_t_up = 1.0;
+    if (largest < RTC_DIRECTION_MIN || largest > RTC_DIRECTION_MAX) {
+        int exponent = clamp(int(floatBitsToUint(largest) >> 23u) - 127, -126, 126);
+        rtc_trav_t_down = uintBitsToFloat(uint(127 - exponent) << 23u);
+        rtc_trav_t_up = uintBitsToFloat(uint(127 + exponent) << 23u);
+    }
+}
+
+// Opacity and facing: instance flags, then ray flags (Vulkan: ray opacity
+// culling, ray face culling).
+uint rtc_level_bits(uint facts, uint instance_flags) {
+    uint bits = (facts & RTC_FACT_AABBS) != 0u ? RTC_LEVEL_AABBS : 0u;
+    if ((instance_flags & RTC_INSTANCE_FORCE_OPAQUE) != 0u) {
+        bits |= RTC_LEVEL_FORCE | RTC_LEVEL_OPAQUE;
+    } else if ((instance_flags & RTC_INSTANCE_FORCE_NO_OPAQUE) != 0u) {
+        bits |= RTC_LEVEL_FORCE;
+    }
+    if ((rtc_ray_flags & RTC_RAY_OPAQUE) != 0u) {
+        bits |= RTC_LEVEL_FORCE | RTC_LEVEL_OPAQUE;
+    } else if ((rtc_ray_flags & RTC_RAY_NO_OPAQUE) != 0u) {
+        bits = (bits & ~RTC_LEVEL_OPAQUE) | RTC_LEVEL_FORCE;
+    }
+    if ((instance_flags & RTC_INSTANCE_TRIANGLE_FRONT_CCW) != 0u) {
+        bits |= RTC_LEVEL_FLIP;
+    }
+    if ((instance_flags & RTC_INSTANCE_TRIANGLE_CULL_DISABLE) == 0u) {
+        bits |= (rtc_ray_flags & RTC_RAY_CULL_FRONT) != 0u ? RTC_LEVEL_CULL_FRONT : 0u;
+        bits |= (rtc_ray_flags & RTC_RAY_CULL_BACK) != 0u ? RTC_LEVEL_CULL_BACK : 0u;
+    }
+    return bits;
+}
+
+void rtc_level_setup() {
+    rtc_trav_setup = 0u;
+    bool top = rtc_trav_instance == RTC_NONE;
+    bool enter = true;
+    uint base = rtc_ray_root;
+    uint bits = 0u;
+    uint record_index = 0u;
+    vec3 o = rtc_ray_origin;
+    vec3 d = rtc_ray_direction * rtc_trav_t_down;
+    if (!top) {
+        uint record = rtc_trav_records + rtc_trav_instance * RTC_INSTANCE_QUADS;
+        uvec4 ids = rtc_quad(record + 6u);
+        uint facts = rtc_quad(record + 7u).x;
+        base = ids.x;
+        bits = rtc_level_bits(facts, ids.w >> 24u);
+        record_index = (ids.w & 0x00ffffffu) + (rtc_ray_sbt_offset & 15u);
+        bool aabbs = (bits & RTC_LEVEL_AABBS) != 0u;
+        uint skip = aabbs ? RTC_RAY_SKIP_AABBS : RTC_RAY_SKIP_TRIANGLES;
+        enter = base != 0u && ((ids.z >> 24u) & rtc_ray_mask) != 0u && (rtc_ray_flags & skip) == 0u &&
+                (aabbs ? RTC_LINK_AABBS : RTC_LINK_TRIANGLES);
+        vec4 r0 = uintBitsToFloat(rtc_quad(record));
+        vec4 r1 = uintBitsToFloat(rtc_quad(record + 1u));
+        vec4 r2 = uintBitsToFloat(rtc_quad(record + 2u));
+        o = rtc_transform_point(r0, r1, r2, o);
+        d = rtc_transform_vector(r0, r1, r2, d);
+        // A singular or overflowing transform leaves no ray to follow.
+        float largest = rtc_largest(d);
+        enter = enter && largest > 0.0 && rtc_finite(largest);
+    }
+    if (enter) {
+        uvec4 header = rtc_quad(base + RTC_HDR_NODES / 4u); // nodes, slots, node count, slot count
+        rtc_trav_nodes = base + header.x;
+        rtc_trav_slots = base + header.y;
+        rtc_trav_record = record_index;
+        rtc_trav_bits = bits;
+        rtc_trav_origin = o;
+        rtc_trav_direction = d;
+        rtc_level_numbers(base, o, d, top);
+        if (header.z == 0u) {
+            rtc_trav_cur = RTC_REF_EMPTY;
+        }
+    } else {
+        // Nothing of the top level's data was touched: carry on there.
+        rtc_trav_instance = RTC_NONE;
+        rtc_trav_floor = 0u;
+        rtc_trav_cur = RTC_REF_POP;
+    }
+}

@@ -1,0 +1,90 @@
+// A ray that waits: RTC_TRACE_STATE_WORDS words of lane storage, used stack
+// entries last. Only words that are needed are written.
+const uint RTC_TRACE_STATE_HEADER = 32u;
+
+void rtc_trace_save(uint first_word) {
+    uint w = first_word;
+    rtc_scratch_store(w, rtc_trav_cur);
+    rtc_scratch_store(w + 1u, rtc_trav_sp);
+    rtc_scratch_store(w + 2u, rtc_trav_floor);
+    rtc_scratch_store(w + 3u, rtc_trav_instance);
+    rtc_scratch_store(w + 4u, rtc_ray_root);
+    rtc_scratch_store(w + 5u, rtc_ray_flags);
+    rtc_scratch_store(w + 6u, rtc_ray_mask);
+    rtc_scratch_store(w + 7u, (rtc_ray_sbt_offset & 15u) | (rtc_ray_sbt_stride & 15u) << 4u | rtc_ray_miss << 8u);
+    rtc_scratch_store(w + 8u, floatBitsToUint(rtc_ray_origin.x));
+    rtc_scratch_store(w + 9u, floatBitsToUint(rtc_ray_origin.y));
+    rtc_scratch_store(w + 10u, floatBitsToUint(rtc_ray_origin.z));
+    rtc_scratch_store(w + 11u, floatBitsToUint(rtc_ray_tmin));
+    rtc_scratch_store(w + 12u, floatBitsToUint(rtc_ray_direction.x));
+    rtc_scratch_store(w + 13u, floatBitsToUint(rtc_ray_direction.y));
+    rtc_scratch_store(w + 14u, floatBitsToUint(rtc_ray_direction.z));
+    rtc_scratch_store(w + 15u, floatBitsToUint(rtc_ray_tmax));
+    rtc_scratch_store(w + 16u, floatBitsToUint(rtc_hit_t));
+    rtc_scratch_store(w + 17u, rtc_hit_kind);
+    rtc_scratch_store(w + 18u, rtc_hit_instance);
+    rtc_scratch_store(w + 19u, rtc_hit_primitive);
+    rtc_scratch_store(w + 20u, rtc_hit_geometry);
+    rtc_scratch_store(w + 21u, rtc_hit_record);
+    rtc_scratch_store(w + 22u, rtc_hit_attr0);
+    rtc_scratch_store(w + 23u, rtc_hit_attr1);
+    if (RTC_LINK_AABBS) {
+        rtc_scratch_store(w + 24u, rtc_hit_attr2);
+        rtc_scratch_store(w + 25u, rtc_hit_attr3);
+        rtc_scratch_store(w + 26u, rtc_hit_attr4);
+        rtc_scratch_store(w + 27u, rtc_hit_attr5);
+        rtc_scratch_store(w + 28u, rtc_hit_attr6);
+        rtc_scratch_store(w + 29u, rtc_hit_attr7);
+    }
+    w += RTC_TRACE_STATE_HEADER;
+    for (uint i = 0u; i < rtc_trav_sp; ++i) {
+        rtc_scratch_store(w + i, rtc_stack_get(i));
+        rtc_turns++;
+    }
+}
+
+void rtc_trace_restore(uint first_word) {
+    uint w = first_word;
+    rtc_trav_cur = rtc_scratch_load(w);
+    rtc_trav_sp = rtc_scratch_load(w + 1u);
+    rtc_trav_floor = rtc_scratch_load(w + 2u);
+    rtc_trav_instance = rtc_scratch_load(w + 3u);
+    rtc_ray_root = rtc_scratch_load(w + 4u);
+    rtc_ray_flags = rtc_scratch_load(w + 5u);
+    rtc_ray_mask = rtc_scratch_load(w + 6u);
+    uint operands = rtc_scratch_load(w + 7u);
+    rtc_ray_sbt_offset = operands & 15u;
+    rtc_ray_sbt_stride = (operands >> 4u) & 15u;
+    rtc_ray_miss = operands >> 8u;
+    rtc_ray_origin.x = uintBitsToFloat(rtc_scratch_load(w + 8u));
+    rtc_ray_origin.y = uintBitsToFloat(rtc_scratch_load(w + 9u));
+    rtc_ray_origin.z = uintBitsToFloat(rtc_scratch_load(w + 10u));
+    rtc_ray_tmin = uintBitsToFloat(rtc_scratch_load(w + 11u));
+    rtc_ray_direction.x = uintBitsToFloat(rtc_scratch_load(w + 12u));
+    rtc_ray_direction.y = uintBitsToFloat(rtc_scratch_load(w + 13u));
+    rtc_ray_direction.z = uintBitsToFloat(rtc_scratch_load(w + 14u));
+    rtc_ray_tmax = uintBitsToFloat(rtc_scratch_load(w + 15u));
+    rtc_hit_t = uintBitsToFloat(rtc_scratch_load(w + 16u));
+    rtc_hit_kind = rtc_scratch_load(w + 17u);
+    rtc_hit_instance = rtc_scratch_load(w + 18u);
+    rtc_hit_primitive = rtc_scratch_load(w + 19u);
+    rtc_hit_geometry = rtc_scratch_load(w + 20u);
+    rtc_hit_record = rtc_scratch_load(w + 21u);
+    rtc_hit_attr0 = rtc_scratch_load(w + 22u);
+    rtc_hit_attr1 = rtc_scratch_load(w + 23u);
+    if (RTC_LINK_AABBS) {
+        rtc_hit_attr2 = rtc_scratch_load(w + 24u);
+        rtc_hit_attr3 = rtc_scratch_load(w + 25u);
+        rtc_hit_attr4 = rtc_scratch_load(w + 26u);
+        rtc_hit_attr5 = rtc_scratch_load(w + 27u);
+        rtc_hit_attr6 = rtc_scratch_load(w + 28u);
+        rtc_hit_attr7 = rtc_scratch_load(w + 29u);
+    }
+    w += RTC_TRACE_STATE_HEADER;
+    for (uint i = 0u; i < min(rtc_trav_sp, RTC_TRAVERSAL_STACK); ++i) {
+        rtc_stack_set(i, rtc_scratch_load(w + i));
+        rtc_turns++;
+    }
+    // A finished ray has nothing to set up.
+    rtc_trav_setup = rtc_trav_cur == RTC_REF_DONE ? 0u : 1u;
+}

@@ -1,0 +1,39 @@
+// Traversal as SPIR-V, ready to be linked into a pipeline. What a module
+// exports, under which names, and how the exports are called: EXPORTS.md.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <iterator>
+#include <string_view>
+
+namespace rtc {
+
+struct TraversalModule {
+    const char* name;  // tier
+    const uint32_t* words;
+    size_t count;
+};
+
+// "watertight" (the default tier) or "fast"; null for a tier that does not exist.
+const TraversalModule* find_traversal_module(std::string_view tier);
+
+// Link constants: SpecIds of bool constants that the linker freezes.
+inline constexpr uint32_t RTC_LINK_BASE = 0x52540100u;
+inline constexpr uint32_t RTC_LINK_ANY_HIT = 0x52540100u;    // false: every candidate triangle is accepted
+inline constexpr uint32_t RTC_LINK_AABBS = 0x52540101u;      // false: no leaf holds AABBs
+inline constexpr uint32_t RTC_LINK_TRIANGLES = 0x52540102u;  // false: no leaf holds triangles
+inline constexpr uint32_t RTC_LINK_RESUMABLE = 0x52540103u;  // false: RTC_SPEC_STEP_BUDGET is ignored
+
+// Words of lane storage that rtc_trace_save writes at most: 32 for ray, hit and
+// cursor, RTC_TRAVERSAL_STACK for the stack. (A lane whose stack is deeper does
+// not suspend until it is not.)
+inline constexpr uint32_t RTC_TRACE_STATE_WORDS = 32u + 64u;
+
+// Results of rtc_trace_step.
+inline constexpr uint32_t RTC_STEP_DONE = 0u;
+inline constexpr uint32_t RTC_STEP_TRIANGLE = 1u;
+inline constexpr uint32_t RTC_STEP_AABB = 2u;
+inline constexpr uint32_t RTC_STEP_SUSPEND = 3u;
+
+}  // namespace rtc
