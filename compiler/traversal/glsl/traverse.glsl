@@ -177,6 +177,7 @@ uint rtc_test_aabb(uint slot) {
 }
 
 // Both children of the node under the cursor; the nearer becomes the cursor.
+// (mix with a boolean is a select.)
 uint rtc_test_node() {
     uint at = rtc_trav_nodes + rtc_trav_cur * RTC_NODE_QUADS;
     uvec4 q0 = rtc_quad(at);
@@ -189,11 +190,11 @@ uint rtc_test_node() {
     hit0 = hit0 && (q0.w >> RTC_REF_COUNT_SHIFT) != (RTC_REF_EMPTY >> RTC_REF_COUNT_SHIFT);
     hit1 = hit1 && (q1.w >> RTC_REF_COUNT_SHIFT) != (RTC_REF_EMPTY >> RTC_REF_COUNT_SHIFT);
     bool second = hit1 && (!hit0 || near1 < near0);
-    rtc_trav_cur = second ? q1.w : (hit0 ? q0.w : RTC_REF_POP);
+    rtc_trav_cur = mix(mix(RTC_REF_POP, q0.w, hit0), q1.w, second);
     uint result = RTC_STEP_RUNNING;
     if (hit0 && hit1) {
         if (rtc_trav_sp < RTC_STACK_ENTRIES) {
-            rtc_stack_set(rtc_trav_sp, second ? q0.w : q1.w);
+            rtc_stack_set(rtc_trav_sp, mix(q1.w, q0.w, second));
             rtc_trav_sp++;
         } else {
             result = RTC_STEP_OVERFLOW;

@@ -9,12 +9,10 @@
 uint rtc_trav_axis; // kz: the axis along which the ray moves fastest
 vec3 rtc_trav_shear; // d.kx / d.kz, d.ky / d.kz, d.kz
 
-// Cyclic, so that orientation is kept: kx, ky, kz.
+// kx, ky, kz: cyclic, so that orientation is kept. (mix with booleans is a
+// select, not arithmetic; `?:` of vectors would become a branch.)
 vec3 rtc_axes(vec3 v) {
-    float x = rtc_trav_axis == 0u ? v.y : (rtc_trav_axis == 1u ? v.z : v.x);
-    float y = rtc_trav_axis == 0u ? v.z : (rtc_trav_axis == 1u ? v.x : v.y);
-    float z = rtc_trav_axis == 0u ? v.x : (rtc_trav_axis == 1u ? v.y : v.z);
-    return vec3(x, y, z);
+    return mix(mix(v, v.zxy, bvec3(rtc_trav_axis == 1u)), v.yzx, bvec3(rtc_trav_axis == 0u));
 }
 
 // Slabs compute t = fl(fl(b - o) * inverse) with |error| <= (1 or 2 + 5 + 1 or
