@@ -1,0 +1,52 @@
+// Made from ../reflections.rchit by tools/render/make-ext-twins; edit that one.
+// Light that arrives directly, through a shadow ray; then the mirror direction, through a ray that comes
+// back to this shader.
+#version 460
+#extension GL_EXT_ray_tracing : require
+#extension GL_GOOGLE_include_directive : require
+#include "../frame.glsl"
+#include "../surface.glsl"
+#include "../lights.glsl"
+#include "../brdf.glsl"
+#include "../reflections.glsl"
+
+layout(set = 0, binding = 0) uniform accelerationStructureEXT scene;
+layout(location = 0) rayPayloadInEXT Radiance incoming;
+layout(location = 1) rayPayloadEXT float visibility;
+layout(location = 2) rayPayloadEXT Radiance reflected;
+hitAttributeEXT vec2 barycentrics;
+
+void main() {
+    vec3 direction = gl_WorldRayDirectionEXT;
+    uvec4 hit = uvec4(gl_InstanceCustomIndexEXT, gl_PrimitiveID, floatBitsToUint(barycentrics));
+    Surface surface = fetch_surface(hit, direction);
+    vec3 ambient = 0.15 * mix(frame.sky_low.rgb, frame.sky_high.rgb, 0.5 + 0.5 * surface.ns.y);
+    vec3 color = surface.emission + surface.base_color * ambient * (1.0 - surface.metallic);
+
+    LightSample light = sample_lights(surface.position, incoming.rng);
+    float pdf;
+    vec3 value = evaluate_brdf(surface, -direction, light.direction, pdf) * light.radiance;
+    if (max(value.r, max(value.g, value.b)) > 0.0) {
+        visibility = 0.0;
+        traceRayEXT(scene, gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsSkipClosestHitShaderEXT, 0xff, 0, 0, 1,
+                spawn_point(surface, light.direction), 0.0, light.direction, light.distance * 0.9999, 1);
+        incoming.rays += 1.0;
+        color += value * visibility;
+    }
+
+    vec3 share = fresnel(ggx_f0(surface), -dot(surface.ns, direction));
+    if (incoming.depth < kMaxReflections && max(share.r, max(share.g, share.b)) > 0.01) {
+        vec3 mirrored = reflect(direction, surface.ns);
+        // Smooth normals can mirror a ray into the triangle; keep it outside.
+        if (dot(mirrored, surface.ng) <= 0.0) mirrored = reflect(direction, surface.ng);
+        reflected.color = vec3(0.0);
+        reflected.depth = incoming.depth + 1u;
+        reflected.rng = incoming.rng;
+        reflected.rays = incoming.rays + 1.0;
+        traceRayEXT(scene, gl_RayFlagsNoneEXT, 0xff, 0, 0, 0, spawn_point(surface, mirrored), 0.0, mirrored, kRayMax, 2);
+        incoming.rng = reflected.rng;
+        incoming.rays = reflected.rays;
+        color += share * reflected.color;
+    }
+    incoming.color = color;
+}
