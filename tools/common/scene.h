@@ -20,6 +20,7 @@ struct Material {
     glm::vec3 emission{0.0f};
     float roughness = 1.0f;
     uint32_t base_color_texture = kNoTexture;  // index into Scene::textures, linear RGBA
+    bool emits_both_sides = false;             // else only the side that sees its vertices counter-clockwise
     bool alpha_tested = false;                 // texels of alpha < 0.5 are holes
 };
 

@@ -171,8 +171,10 @@ Scene furnace() {
     Scene scene;
     const float reflectances[] = {0.5f, 0.7f, 0.3f};
     uint32_t materials[3];
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < 3; ++i) {
         materials[i] = add_material(scene, glm::vec3(reflectances[i]), 0, 1, glm::vec3(1.0f - reflectances[i]));
+        scene.materials[materials[i]].emits_both_sides = true;
+    }
     place(scene, add_mesh(scene, make_quad({-2, -1, -2}, {0, 0, 4}, {4, 0, 0}, materials[0]), "floor"));
     const uint32_t box = add_mesh(scene, make_box(glm::vec3(-0.5f), glm::vec3(0.5f), materials[1]), "box");
     place(scene, box, glm::rotate(glm::translate(glm::mat4(1), {-0.6f, -0.4f, 0}), 0.6f, {0.3f, 1.0f, 0.1f}));

@@ -88,6 +88,7 @@ class Loader {
             material.emission *= float(strength->second.Get("emissiveStrength").GetNumberAsDouble());
         material.metallic = float(pbr.metallicFactor);
         material.roughness = float(pbr.roughnessFactor);
+        material.emits_both_sides = source.doubleSided;
         material.alpha_tested = source.alphaMode == "MASK";
         if (pbr.baseColorTexture.index >= 0) {
             const int image = at(model_.textures, pbr.baseColorTexture.index, "texture").source;

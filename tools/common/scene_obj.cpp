@@ -21,6 +21,7 @@ Material convert(const tinyobj::material_t& source, Scene& scene, const std::str
     material.name = source.name;
     material.base_color = {source.diffuse[0], source.diffuse[1], source.diffuse[2]};
     material.emission = {source.emission[0], source.emission[1], source.emission[2]};
+    material.emits_both_sides = true;
     // The PBR extension where the file has it, else the Phong exponent (Walter et al. 2007, a = sqrt(2/(n+2))).
     material.metallic = source.metallic;
     material.roughness = source.roughness > 0 ? source.roughness : std::sqrt(std::sqrt(2.0f / (source.shininess + 2.0f)));

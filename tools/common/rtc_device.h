@@ -1,0 +1,96 @@
+// rtc's runtime in C++ clothes: results become exceptions that carry the
+// runtime's own messages, and objects end with their scope.
+#pragma once
+
+#include <rtc/abi.h>
+#include <rtc/runtime.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ray_tracing_job.h"
+#include "resources.h"
+#include "scene.h"
+#include "vulkan_context.h"
+
+namespace rtc::tools {
+
+class RtcDevice {
+  public:
+    explicit RtcDevice(const Context& context);
+    ~RtcDevice();
+    RtcDevice(const RtcDevice&) = delete;
+    RtcDevice& operator=(const RtcDevice&) = delete;
+
+    const Context& context;
+    RtrDevice handle = nullptr;
+    RtrPhysicalDeviceSupport support{};
+
+    // Throws an Error with what the runtime said since the last one.
+    void check(VkResult result, const char* call) const;
+
+  private:
+    std::unique_ptr<std::string> messages_;
+};
+
+// A scene's acceleration structures, built on the device.
+class RtcScene {
+  public:
+    RtcScene(const RtcDevice& device, const Scene& scene, bool fast_build = false);
+    ~RtcScene();
+    RtcScene(const RtcScene&) = delete;
+    RtcScene& operator=(const RtcScene&) = delete;
+
+    RtrHeap heap = nullptr;
+    RtrAccelerationStructure top = nullptr;
+    VkDescriptorBufferInfo descriptor() const;
+    double build_seconds = 0;  // wall time of recording, building and waiting
+    VkDeviceSize bytes = 0;    // of all structures
+
+  private:
+    const RtcDevice& device_;
+    Buffer heap_buffer_;
+    std::vector<RtrAccelerationStructure> bottoms_;
+};
+
+// A compiled job with its descriptors and shader binding table, ready to be launched many times.
+class RtcLauncher {
+  public:
+    // The job's buffers and images must outlive the launcher.
+    RtcLauncher(const RtcDevice& device, const RtcScene& scene, const RayTracingJob& job,
+                const std::vector<uint32_t>& module);
+    ~RtcLauncher();
+    RtcLauncher(const RtcLauncher&) = delete;
+    RtcLauncher& operator=(const RtcLauncher&) = delete;
+
+    // Records one launch; `push_constants` replaces the job's. At most max_launches() between two checks.
+    void record(VkCommandBuffer commands, const std::vector<uint8_t>& push_constants);
+    // After the commands have completed: throws an Error for the first launch that failed, and frees what
+    // the recorded launches held.
+    void finish();
+    uint32_t max_launches() const { return kLaunches; }
+    RtrPipelineInfo info() const;
+    double create_seconds = 0;  // the driver's share of getting ready, as far as it does it then
+
+  private:
+    static constexpr uint32_t kLaunches = 64;
+    void make_descriptors(const RtcScene& scene, const RayTracingJob& job);
+    void make_table(const JobTable& table);
+    void make_recorder(const RtcScene& scene);
+
+    const RtcDevice& device_;
+    RtrPipeline pipeline_ = nullptr;
+    RtrRecorder recorder_ = nullptr;
+    Buffer table_, control_, scratch_;
+    RtrSbtLayout table_layout_{};
+    VkDeviceSize raygen_offset_ = 0;
+    std::vector<VkDescriptorSetLayout> layouts_;
+    std::vector<VkDescriptorSet> sets_;
+    VkDescriptorPool pool_ = VK_NULL_HANDLE;
+    VkExtent3D extent_{};
+    VkCommandBuffer recording_ = VK_NULL_HANDLE;
+    RtrHeap heap_ = nullptr;
+};
+
+}  // namespace rtc::tools

@@ -1,0 +1,193 @@
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <map>
+
+#include "error.h"
+#include "rtc_device.h"
+
+namespace rtc::tools {
+namespace {
+
+// Suspended lanes of this many bytes at most; larger launches go in tiles.
+constexpr VkDeviceSize kScratchLimit = 96u << 20;
+constexpr uint32_t kRounds = 64;  // the runtime's default
+
+std::vector<RtrSbtRecord> convert(const std::vector<JobRecord>& records) {
+    std::vector<RtrSbtRecord> converted;
+    for (const JobRecord& record : records)
+        converted.push_back({record.group == ~0u ? RTR_NULL_GROUP : record.group, uint32_t(record.data.size()),
+                             record.data.data()});
+    return converted;
+}
+
+}  // namespace
+
+RtcLauncher::RtcLauncher(const RtcDevice& device, const RtcScene& scene, const RayTracingJob& job,
+                         const std::vector<uint32_t>& module)
+    : device_(device), extent_{job.width, job.height, job.depth} {
+    make_descriptors(scene, job);
+    const auto start = std::chrono::steady_clock::now();
+    VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, uint32_t(job.push_constants.size())};
+    RtrRayTracingPipelineCreateInfo info{};
+    info.pCode = module.data();
+    info.codeSize = module.size() * sizeof(uint32_t);
+    info.setLayoutCount = uint32_t(layouts_.size());
+    info.pSetLayouts = layouts_.data();
+    info.pushConstantRangeCount = range.size ? 1 : 0;
+    info.pPushConstantRanges = &range;
+    device.check(rtrCreateRayTracingPipeline(device.handle, VK_NULL_HANDLE, &info, nullptr, &pipeline_),
+                 "rtrCreateRayTracingPipeline");
+    create_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    make_table(job.table);
+    make_recorder(scene);
+}
+
+RtcLauncher::~RtcLauncher() {
+    const VkDevice device = device_.context.device;
+    rtrDestroyRecorder(device_.handle, recorder_, nullptr);
+    rtrDestroyPipeline(device_.handle, pipeline_, nullptr);
+    vkDestroyDescriptorPool(device, pool_, nullptr);
+    for (VkDescriptorSetLayout layout : layouts_) vkDestroyDescriptorSetLayout(device, layout, nullptr);
+}
+
+void RtcLauncher::make_descriptors(const RtcScene& scene, const RayTracingJob& job) {
+    const VkDevice device = device_.context.device;
+    auto type_of = [](const JobBinding& binding) {
+        return binding.acceleration_structure ? VK_DESCRIPTOR_TYPE_STORAGE_BUFFER : binding.type;
+    };
+    std::map<VkDescriptorType, uint32_t> counts;
+    uint32_t set_count = 0;
+    for (const JobBinding& binding : job.bindings) {
+        set_count = std::max(set_count, binding.set + 1);
+        counts[type_of(binding)] += binding.count;
+    }
+    if (set_count == 0) return;
+    for (uint32_t set = 0; set < set_count; ++set) {
+        std::vector<VkDescriptorSetLayoutBinding> bindings;
+        for (const JobBinding& binding : job.bindings)
+            if (binding.set == set)
+                bindings.push_back({binding.binding, type_of(binding), binding.count, VK_SHADER_STAGE_COMPUTE_BIT,
+                                    nullptr});
+        VkDescriptorSetLayoutCreateInfo info{};
+        info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO;
+        info.bindingCount = uint32_t(bindings.size());
+        info.pBindings = bindings.data();
+        layouts_.push_back(VK_NULL_HANDLE);
+        tools::check(vkCreateDescriptorSetLayout(device, &info, nullptr, &layouts_.back()),
+                     "vkCreateDescriptorSetLayout");
+    }
+    std::vector<VkDescriptorPoolSize> sizes;
+    for (const auto& [type, count] : counts) sizes.push_back({type, count});
+    VkDescriptorPoolCreateInfo poolInfo{};
+    poolInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
+    poolInfo.maxSets = set_count;
+    poolInfo.poolSizeCount = uint32_t(sizes.size());
+    poolInfo.pPoolSizes = sizes.data();
+    tools::check(vkCreateDescriptorPool(device, &poolInfo, nullptr, &pool_), "vkCreateDescriptorPool");
+    sets_.resize(set_count);
+    VkDescriptorSetAllocateInfo allocate{};
+    allocate.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO;
+    allocate.descriptorPool = pool_;
+    allocate.descriptorSetCount = set_count;
+    allocate.pSetLayouts = layouts_.data();
+    tools::check(vkAllocateDescriptorSets(device, &allocate, sets_.data()), "vkAllocateDescriptorSets");
+
+    for (const JobBinding& binding : job.bindings) {
+        std::vector<VkDescriptorBufferInfo> structures(binding.acceleration_structure ? binding.count : 0);
+        for (VkDescriptorBufferInfo& structure : structures) structure = scene.descriptor();
+        VkWriteDescriptorSet write{};
+        write.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
+        write.dstSet = sets_[binding.set];
+        write.dstBinding = binding.binding;
+        write.descriptorCount = binding.count;
+        write.descriptorType = type_of(binding);
+        write.pBufferInfo = binding.acceleration_structure ? structures.data() : binding.buffers.data();
+        write.pImageInfo = binding.images.data();
+        write.pTexelBufferView = binding.texel_buffers.data();
+        vkUpdateDescriptorSets(device, 1, &write, 0, nullptr);
+    }
+}
+
+void RtcLauncher::make_table(const JobTable& table) {
+    const std::vector<RtrSbtRecord> raygen = convert(table.raygen), miss = convert(table.miss),
+                                    hit = convert(table.hit), callable = convert(table.callable);
+    const RtrSbtInfo info{uint32_t(raygen.size()), raygen.data(), uint32_t(miss.size()),     miss.data(),
+                          uint32_t(hit.size()),    hit.data(),    uint32_t(callable.size()), callable.data()};
+    device_.check(rtrGetSbtLayout(device_.handle, &info, &table_layout_), "rtrGetSbtLayout");
+    std::vector<uint8_t> bytes(table_layout_.size);
+    device_.check(rtrWriteSbt(device_.handle, pipeline_, &info, &table_layout_, bytes.data()), "rtrWriteSbt");
+    table_ = upload_vector(device_.context, bytes, RTR_INPUT_BUFFER_USAGE);
+    raygen_offset_ = table_layout_.raygen.offset + table.raygen_index * table_layout_.raygen.stride;
+}
+
+void RtcLauncher::make_recorder(const RtcScene& scene) {
+    VkDeviceSize minimum = 0;
+    const VkDeviceSize full = rtrGetLaunchScratchSize(device_.handle, pipeline_, extent_.width, extent_.height,
+                                                      extent_.depth, &minimum);
+    uint32_t tiles = 1;
+    if (full) {
+        const VkDeviceSize size = std::max(minimum, std::min(full, kScratchLimit));
+        scratch_ = Buffer(device_.context, size, RTR_LAUNCH_SCRATCH_BUFFER_USAGE, MemoryKind::Device);
+        tiles = uint32_t((full + size - 1) / size) + 1;
+    }
+    const bool resumable = info().moduleFlags & RTC_MODULE_RESUMABLE;
+    const VkDeviceSize control_size =
+        rtrGetRecorderControlSize(device_.handle, kLaunches, tiles, resumable ? kRounds : 1);
+    control_ = Buffer(device_.context, control_size, RTR_CONTROL_BUFFER_USAGE, MemoryKind::Host);
+    RtrRecorderCreateInfo recorderInfo{};
+    recorderInfo.controlBuffer = control_.handle;
+    recorderInfo.controlSize = control_size;
+    device_.check(rtrCreateRecorder(device_.handle, &recorderInfo, nullptr, &recorder_), "rtrCreateRecorder");
+    heap_ = scene.heap;
+}
+
+void RtcLauncher::record(VkCommandBuffer commands, const std::vector<uint8_t>& push_constants) {
+    if (commands != recording_) {
+        device_.check(rtrBeginRecorder(recorder_, commands), "rtrBeginRecorder");
+        device_.check(rtrCmdSetHeap(recorder_, heap_), "rtrCmdSetHeap");
+        if (scratch_.handle)
+            device_.check(rtrCmdSetLaunchScratch(recorder_, scratch_.handle, 0, scratch_.size),
+                          "rtrCmdSetLaunchScratch");
+        device_.check(rtrCmdBindPipeline(recorder_, pipeline_), "rtrCmdBindPipeline");
+        if (!sets_.empty())
+            device_.check(rtrCmdBindDescriptorSets(recorder_, 0, uint32_t(sets_.size()), sets_.data(), 0, nullptr),
+                          "rtrCmdBindDescriptorSets");
+        recording_ = commands;
+    }
+    if (!push_constants.empty())
+        device_.check(rtrCmdPushConstants(recorder_, 0, uint32_t(push_constants.size()), push_constants.data()),
+                      "rtrCmdPushConstants");
+    auto region = [&](const RtrSbtRegion& part) {
+        return RtrStridedBufferRegion{part.size ? table_.handle : VK_NULL_HANDLE, part.offset, part.stride, part.size};
+    };
+    RtrStridedBufferRegion raygen = region(table_layout_.raygen);
+    raygen.offset = raygen_offset_;
+    raygen.size = raygen.stride;
+    const RtrStridedBufferRegion miss = region(table_layout_.miss), hit = region(table_layout_.hit),
+                                 callable = region(table_layout_.callable);
+    device_.check(rtrCmdTraceRaysRegions(recorder_, &raygen, &miss, &hit, &callable, extent_.width, extent_.height,
+                                         extent_.depth),
+                  "rtrCmdTraceRaysRegions");
+    full_barrier(commands);
+}
+
+void RtcLauncher::finish() {
+    for (uint32_t launch = 0; launch < rtrGetLaunchCount(recorder_); ++launch) {
+        RtrLaunchError problem{};
+        if (rtrGetLaunchError(recorder_, launch, control_.mapped, &problem) == VK_SUCCESS) continue;
+        char text[256];
+        rtrFormatLaunchError(&problem, text, sizeof text);
+        throw Error(std::string("launch ") + std::to_string(launch) + ": " + text);
+    }
+    device_.check(rtrRetireRecorder(recorder_), "rtrRetireRecorder");
+    recording_ = VK_NULL_HANDLE;
+}
+
+RtrPipelineInfo RtcLauncher::info() const {
+    RtrPipelineInfo info{};
+    rtrGetPipelineInfo(pipeline_, &info);
+    return info;
+}
+
+}  // namespace rtc::tools

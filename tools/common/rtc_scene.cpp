@@ -1,0 +1,188 @@
+// Acceleration structures of a Scene: one bottom level a mesh, one top level.
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+
+#include "error.h"
+#include "rtc_device.h"
+
+namespace rtc::tools {
+namespace {
+
+constexpr VkDeviceSize kAlign = 256;
+VkDeviceSize align_up(VkDeviceSize size) { return (size + kAlign - 1) / kAlign * kAlign; }
+
+// The buffers of one mesh and the geometry that names them.
+struct BottomInput {
+    Buffer positions, indices;
+    VkGeometryNV geometry{};
+};
+
+VkGeometryNV empty_geometry(const Mesh& mesh) {
+    VkGeometryNV geometry{};
+    geometry.sType = VK_STRUCTURE_TYPE_GEOMETRY_NV;
+    geometry.geometry.triangles.sType = VK_STRUCTURE_TYPE_GEOMETRY_TRIANGLES_NV;
+    geometry.geometry.aabbs.sType = VK_STRUCTURE_TYPE_GEOMETRY_AABB_NV;
+    if (mesh.opaque) geometry.flags |= VK_GEOMETRY_OPAQUE_BIT_NV;
+    if (mesh.no_duplicate_any_hit) geometry.flags |= VK_GEOMETRY_NO_DUPLICATE_ANY_HIT_INVOCATION_BIT_NV;
+    return geometry;
+}
+
+BottomInput upload_mesh(const Context& context, const Mesh& mesh) {
+    BottomInput input;
+    input.geometry = empty_geometry(mesh);
+    if (mesh.procedural()) {
+        input.positions = upload_vector(context, mesh.boxes, RTR_INPUT_BUFFER_USAGE);
+        input.geometry.geometryType = VK_GEOMETRY_TYPE_AABBS_NV;
+        VkGeometryAABBNV& boxes = input.geometry.geometry.aabbs;
+        boxes.aabbData = input.positions.handle;
+        boxes.numAABBs = uint32_t(mesh.boxes.size());
+        boxes.stride = sizeof(Mesh::Box);
+        return input;
+    }
+    input.positions = upload_vector(context, mesh.positions, RTR_INPUT_BUFFER_USAGE);
+    input.indices = upload_vector(context, mesh.indices, RTR_INPUT_BUFFER_USAGE);
+    input.geometry.geometryType = VK_GEOMETRY_TYPE_TRIANGLES_NV;
+    VkGeometryTrianglesNV& triangles = input.geometry.geometry.triangles;
+    triangles.vertexData = input.positions.handle;
+    triangles.vertexCount = uint32_t(mesh.positions.size());
+    triangles.vertexStride = sizeof(glm::vec3);
+    triangles.vertexFormat = VK_FORMAT_R32G32B32_SFLOAT;
+    triangles.indexData = input.indices.handle;
+    triangles.indexCount = uint32_t(mesh.indices.size());
+    triangles.indexType = VK_INDEX_TYPE_UINT32;
+    return input;
+}
+
+VkDeviceSize requirement(RtrDevice device, RtrAccelerationStructure structure,
+                         VkAccelerationStructureMemoryRequirementsTypeNV type) {
+    VkMemoryRequirements2 needed{};
+    needed.sType = VK_STRUCTURE_TYPE_MEMORY_REQUIREMENTS_2;
+    rtrGetAccelerationStructureMemoryRequirements(device, type, structure, &needed);
+    return align_up(needed.memoryRequirements.size);
+}
+
+VkAccelerationStructureInstanceNV convert(const Instance& instance, uint64_t reference) {
+    VkAccelerationStructureInstanceNV converted{};
+    for (int row = 0; row < 3; ++row)
+        for (int column = 0; column < 4; ++column)
+            converted.transform.matrix[row][column] = instance.transform[column][row];
+    converted.instanceCustomIndex = instance.custom_index & 0xffffffu;
+    converted.mask = instance.mask & 0xffu;
+    converted.instanceShaderBindingTableRecordOffset = instance.sbt_offset & 0xffffffu;
+    converted.flags = instance.flags & 0xffu;
+    converted.accelerationStructureReference = reference;
+    return converted;
+}
+
+}  // namespace
+
+RtcScene::RtcScene(const RtcDevice& device, const Scene& scene, bool fast_build) : device_(device) {
+    const auto start = std::chrono::steady_clock::now();
+    const Context& context = device.context;
+    const VkBuildAccelerationStructureFlagsNV flags =
+        fast_build ? VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_BUILD_BIT_NV
+                   : VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_TRACE_BIT_NV;
+
+    std::vector<BottomInput> inputs;
+    std::vector<VkAccelerationStructureInfoNV> infos;
+    auto create = [&](const VkAccelerationStructureInfoNV& info) {
+        VkAccelerationStructureCreateInfoNV createInfo{};
+        createInfo.sType = VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_CREATE_INFO_NV;
+        createInfo.info = info;
+        RtrAccelerationStructure structure = nullptr;
+        device.check(rtrCreateAccelerationStructure(device.handle, &createInfo, nullptr, &structure),
+                     "rtrCreateAccelerationStructure");
+        return structure;
+    };
+    VkAccelerationStructureInfoNV info{};
+    info.sType = VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV;
+    info.flags = flags;
+
+    inputs.reserve(scene.meshes.size());  // infos point into it
+    for (const Mesh& mesh : scene.meshes) {
+        inputs.push_back(upload_mesh(context, mesh));
+        info.type = VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_NV;
+        info.geometryCount = 1;
+        info.pGeometries = &inputs.back().geometry;
+        infos.push_back(info);
+        bottoms_.push_back(create(info));
+    }
+    info.type = VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV;
+    info.geometryCount = 0;
+    info.pGeometries = nullptr;
+    info.instanceCount = uint32_t(scene.instances.size());
+    infos.push_back(info);
+    top = create(info);
+
+    std::vector<RtrAccelerationStructure> all = bottoms_;
+    all.push_back(top);
+    VkDeviceSize scratch_size = 0;
+    std::vector<VkDeviceSize> sizes;
+    for (RtrAccelerationStructure structure : all) {
+        sizes.push_back(
+            requirement(device.handle, structure, VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_OBJECT_NV));
+        bytes += sizes.back();
+        scratch_size = std::max(scratch_size, requirement(device.handle, structure,
+                                                          VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_BUILD_SCRATCH_NV));
+    }
+    const VkDeviceSize heap_size = bytes + 2 * kAlign;
+    heap_buffer_ = Buffer(context, heap_size, RTR_HEAP_BUFFER_USAGE, MemoryKind::Device);
+    RtrHeapCreateInfo heapInfo{};
+    heapInfo.buffer = heap_buffer_.handle;
+    heapInfo.size = heap_size;
+    device.check(rtrCreateHeap(device.handle, &heapInfo, nullptr, &heap), "rtrCreateHeap");
+    for (size_t i = 0; i < all.size(); ++i) {
+        RtrBindAccelerationStructureMemoryInfo bind{};
+        bind.accelerationStructure = all[i];
+        bind.heap = heap;
+        device.check(rtrAllocateHeapRange(heap, sizes[i], 0, &bind.heapOffset), "rtrAllocateHeapRange");
+        device.check(rtrBindAccelerationStructureMemory(device.handle, 1, &bind),
+                     "rtrBindAccelerationStructureMemory");
+    }
+
+    std::vector<VkAccelerationStructureInstanceNV> instances;
+    for (const Instance& instance : scene.instances) {
+        uint64_t reference = 0;
+        device.check(rtrGetAccelerationStructureHandle(device.handle, bottoms_[instance.mesh], sizeof reference,
+                                                       &reference),
+                     "rtrGetAccelerationStructureHandle");
+        instances.push_back(convert(instance, reference));
+    }
+    Buffer instance_buffer = upload_vector(context, instances, RTR_INPUT_BUFFER_USAGE);
+    Buffer scratch(context, scratch_size, RTR_SCRATCH_BUFFER_USAGE, MemoryKind::Device);
+
+    RtrRecorderCreateInfo recorderInfo{};
+    RtrRecorder recorder = nullptr;
+    device.check(rtrCreateRecorder(device.handle, &recorderInfo, nullptr, &recorder), "rtrCreateRecorder");
+    context.run([&](VkCommandBuffer commands) {
+        device.check(rtrBeginRecorder(recorder, commands), "rtrBeginRecorder");
+        device.check(rtrCmdInitializeHeap(recorder, heap), "rtrCmdInitializeHeap");
+        for (size_t i = 0; i < all.size(); ++i) {
+            const bool is_top = i + 1 == all.size();
+            device.check(rtrCmdBuildAccelerationStructure(
+                             recorder, &infos[i], is_top ? instance_buffer.handle : VK_NULL_HANDLE, 0, VK_FALSE,
+                             all[i], nullptr, scratch.handle, 0),
+                         "rtrCmdBuildAccelerationStructure");
+            full_barrier(commands);  // the scratch is shared, and the top level reads the others
+        }
+    });
+    rtrDestroyRecorder(device.handle, recorder, nullptr);
+    build_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+RtcScene::~RtcScene() {
+    for (RtrAccelerationStructure structure : bottoms_)
+        rtrDestroyAccelerationStructure(device_.handle, structure, nullptr);
+    rtrDestroyAccelerationStructure(device_.handle, top, nullptr);
+    rtrDestroyHeap(device_.handle, heap, nullptr);
+}
+
+VkDescriptorBufferInfo RtcScene::descriptor() const {
+    VkDescriptorBufferInfo info{};
+    device_.check(rtrGetAccelerationStructureDescriptor(device_.handle, top, &info),
+                  "rtrGetAccelerationStructureDescriptor");
+    return info;
+}
+
+}  // namespace rtc::tools

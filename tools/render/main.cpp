@@ -1,0 +1,103 @@
+// rtc-render: draws scenes with ray tracing shaders on plain Vulkan compute.
+#include <CLI/CLI.hpp>
+
+#include <cstdio>
+
+#include "demo.h"
+#include "error.h"
+#include "image_file.h"
+#include "renderer.h"
+
+namespace {
+
+using namespace rtc::tools;
+
+std::string joined(const std::vector<std::string>& words) {
+    std::string text;
+    for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+    return text;
+}
+
+struct Arguments {
+    std::string scene = "builtin:cornell", integrator = "path", dialect = "nv", device, output, demo_folder;
+    std::vector<float> eye, target;
+    float field_of_view = 0, exposure = 1;
+    bool validate = false, demo = false;
+    RenderOptions render;
+};
+
+void set_camera(const Arguments& arguments, Camera& camera) {
+    if (!arguments.eye.empty()) camera.eye = {arguments.eye[0], arguments.eye[1], arguments.eye[2]};
+    if (!arguments.target.empty())
+        camera.target = {arguments.target[0], arguments.target[1], arguments.target[2]};
+    if (arguments.field_of_view > 0) camera.fov_y = glm::radians(arguments.field_of_view);
+}
+
+int draw(Arguments& arguments) {
+    ContextOptions options;
+    options.device = arguments.device;
+    options.validate = arguments.validate;
+    Context context(options);
+    {
+        RtcDevice device(context);
+        if (arguments.demo) {
+            draw_demo(device, arguments.demo_folder, arguments.render);
+        } else {
+            Scene scene = load_scene(arguments.scene);
+            set_camera(arguments, scene.camera);
+            arguments.render.settings.integrator = integrator_from_name(arguments.integrator);
+            arguments.render.settings.ext_dialect = arguments.dialect == "ext";
+            RenderResult result = render(device, scene, arguments.render);
+            for (size_t i = 0; i < result.picture.pixels.size(); ++i)
+                if (i % 4 != 3) result.picture.pixels[i] *= arguments.exposure;
+            write_picture(arguments.output, result.picture);
+            std::printf("wrote %s (compile %.2f s, build %.2f s, trace %.2f s)\n", arguments.output.c_str(),
+                        result.compile_seconds, result.build_seconds, result.trace_seconds);
+        }
+    }
+    context.require_silent_validation();
+    return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    Arguments arguments;
+    RenderOptions& render = arguments.render;
+    CLI::App app{"Draws scenes with GLSL ray tracing shaders, compiled by rtc to plain Vulkan compute."};
+    app.add_option("--scene", arguments.scene,
+                   "a .gltf, .glb or .obj file, or builtin:NAME (" + joined(builtin_scene_names()) + ")")
+        ->capture_default_str();
+    app.add_option("--integrator", arguments.integrator, joined(integrator_names()))->capture_default_str();
+    app.add_option("--width", render.settings.width, "pixels")->capture_default_str();
+    app.add_option("--height", render.settings.height, "pixels")->capture_default_str();
+    app.add_option("--samples", render.samples, "launches, one jittered sample a pixel each")
+        ->capture_default_str()->check(CLI::Range(1, 1 << 24));
+    app.add_option("-o,--output", arguments.output, "picture to write: .png, .exr or .pfm");
+    app.add_option("--device", arguments.device, "index or part of the name; default: $RTC_DEVICE, else the best");
+    app.add_flag("--validate", arguments.validate, "Vulkan validation; any message is an error (also RTC_VALIDATION=1)");
+    app.add_option("--max-bounces", render.settings.max_bounces, "of a path")->capture_default_str();
+    app.add_option("--shadow-samples", render.settings.shadow_samples, "shadow rays a launch")->capture_default_str();
+    app.add_option("--ao-samples", render.settings.ao_samples, "occlusion rays a launch")->capture_default_str();
+    app.add_option("--ao-radius", render.settings.ao_radius, "0: a quarter of the scene");
+    app.add_option("--eye", arguments.eye, "camera position: X Y Z")->expected(3);
+    app.add_option("--target", arguments.target, "what it looks at: X Y Z")->expected(3);
+    app.add_option("--fov", arguments.field_of_view, "vertical field of view, degrees");
+    app.add_option("--exposure", arguments.exposure, "factor on the picture")->capture_default_str();
+    app.add_option("--dialect", arguments.dialect, "shaders to compile: nv or ext")
+        ->capture_default_str()->check(CLI::IsMember({"nv", "ext"}));
+    app.add_option("--shaders", render.settings.shader_folder, "folder of the shaders (also RTC_SHADERS)");
+    app.add_option("--module", render.modules, "precompiled module, one for each pass, instead of the shaders");
+    app.add_option("--save-modules", render.save_modules, "folder to keep the compiled modules in");
+    app.add_flag("--fast-build", render.fast_build, "prefer build speed to trace speed");
+    app.add_flag("!--no-optimize", render.optimize, "compile without -O");
+    app.add_flag("--quiet", render.quiet, "no progress");
+    app.add_flag("--demo", arguments.demo, "draw the three demo pictures");
+    app.add_option("--out-dir", arguments.demo_folder, "where --demo writes")->default_str("out/demo");
+    CLI11_PARSE(app, argc, argv);
+    if (arguments.demo_folder.empty()) arguments.demo_folder = "out/demo";
+    return run_program("rtc-render", [&] {
+        if (arguments.output.empty() && !arguments.demo) throw Error("-o FILE or --demo is needed");
+        return draw(arguments);
+    });
+}
