@@ -1,0 +1,210 @@
+/* Acceleration structure objects: what they hold, how large they are, where they lie. */
+#include "internal.h"
+
+#define MAX_PRIMITIVES (1u << 26)
+#define MAX_INSTANCES (1u << 24)
+
+static VkResult bad(RtrDevice d, const char* id, const char* text, unsigned geometry) {
+    return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, id, "acceleration structure, geometry %u: %s", geometry, text);
+}
+
+static VkResult check_triangles(RtrDevice d, const VkGeometryTrianglesNV* t, unsigned g, uint32_t* primitives) {
+    if (t->pNext) return bad(d, "pNext", "VkGeometryTrianglesNV::pNext must be NULL", g);
+    if (t->vertexFormat != VK_FORMAT_R32G32B32_SFLOAT && t->vertexFormat != VK_FORMAT_R32G32B32A32_SFLOAT)
+        return rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "vertex-format",
+                         "acceleration structure, geometry %u: vertex format %d is not supported; use "
+                         "VK_FORMAT_R32G32B32_SFLOAT",
+                         g, (int)t->vertexFormat);
+    if (t->vertexStride % 4 != 0 || (t->vertexStride < 12 && t->vertexCount > 1))
+        return bad(d, "vertex-stride", "vertexStride must be a multiple of 4 and at least 12", g);
+    if (t->vertexOffset % 4 != 0) return bad(d, "vertex-offset", "vertexOffset must be a multiple of 4", g);
+    switch (t->indexType) {
+        case VK_INDEX_TYPE_NONE_NV:
+            if (t->indexCount != 0) return bad(d, "index-count", "indexCount must be 0 with VK_INDEX_TYPE_NONE_NV", g);
+            *primitives = t->vertexCount / 3;
+            if (t->vertexCount % 3) return bad(d, "vertex-count", "vertexCount must be a multiple of 3 without indices", g);
+            break;
+        case VK_INDEX_TYPE_UINT16:
+        case VK_INDEX_TYPE_UINT32:
+            if (t->indexOffset % (t->indexType == VK_INDEX_TYPE_UINT16 ? 2 : 4))
+                return bad(d, "index-offset", "indexOffset must be a multiple of the index size", g);
+            if (t->indexCount % 3) return bad(d, "index-count", "indexCount must be a multiple of 3", g);
+            if (t->indexCount && !t->vertexCount) return bad(d, "vertex-count", "indices but no vertices", g);
+            *primitives = t->indexCount / 3;
+            break;
+        default:
+            return bad(d, "index-type", "indexType must be NONE_NV, UINT16 or UINT32", g);
+    }
+    if (t->transformOffset % 16) return bad(d, "transform-offset", "transformOffset must be a multiple of 16", g);
+    return VK_SUCCESS;
+}
+
+static VkResult check_aabbs(RtrDevice d, const VkGeometryAABBNV* b, unsigned g, uint32_t* primitives) {
+    if (b->pNext) return bad(d, "pNext", "VkGeometryAABBNV::pNext must be NULL", g);
+    if (b->stride % 8 != 0 || (b->stride < 24 && b->numAABBs > 1))
+        return bad(d, "aabb-stride", "stride must be a multiple of 8 and at least 24", g);
+    if (b->offset % 8 != 0) return bad(d, "aabb-offset", "offset must be a multiple of 8", g);
+    *primitives = b->numAABBs;
+    return VK_SUCCESS;
+}
+
+VkResult rtr_check_geometry(RtrDevice d, const VkGeometryNV* g, unsigned index, uint32_t* primitives) {
+    if (g->pNext) return bad(d, "pNext", "VkGeometryNV::pNext must be NULL", index);
+    if (g->geometryType == VK_GEOMETRY_TYPE_TRIANGLES_NV)
+        return check_triangles(d, &g->geometry.triangles, index, primitives);
+    if (g->geometryType == VK_GEOMETRY_TYPE_AABBS_NV) return check_aabbs(d, &g->geometry.aabbs, index, primitives);
+    return bad(d, "geometry-type", "geometryType must be TRIANGLES or AABBS", index);
+}
+
+static VkResult fill_from_info(RtrDevice d, RtrAccelerationStructure as, const VkAccelerationStructureInfoNV* info,
+                               const VkAllocationCallbacks* a) {
+    uint64_t total = 0;
+    uint32_t i;
+    as->type = info->type;
+    as->flags = info->flags;
+    if (info->type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV) {
+        if (info->geometryCount)
+            return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "as-counts", "a top level has no geometries");
+        if (info->instanceCount > MAX_INSTANCES)
+            return rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "maxInstanceCount", "%u instances; the limit is %u",
+                             info->instanceCount, MAX_INSTANCES);
+        as->instance_count = as->primitive_count = info->instanceCount;
+        return VK_SUCCESS;
+    }
+    if (info->type != VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_NV)
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "as-type", "type must be TOP_LEVEL or BOTTOM_LEVEL");
+    if (info->instanceCount)
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "as-counts", "a bottom level has no instances");
+    if (info->geometryCount > RTC_SLOT_GEOMETRY_MASK)
+        return rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "maxGeometryCount", "%u geometries; the limit is %u",
+                         info->geometryCount, RTC_SLOT_GEOMETRY_MASK);
+    as->geometry_count = info->geometryCount;
+    if (info->geometryCount) {
+        as->geometries = rtr_alloc(a, info->geometryCount * sizeof *as->geometries);
+        if (!as->geometries) return VK_ERROR_OUT_OF_HOST_MEMORY;
+        memcpy(as->geometries, info->pGeometries, info->geometryCount * sizeof *as->geometries);
+    }
+    for (i = 0; i < info->geometryCount; i++) {
+        uint32_t primitives = 0;
+        VkResult r = rtr_check_geometry(d, &as->geometries[i], i, &primitives);
+        if (r != VK_SUCCESS) return r;
+        if (as->geometries[i].geometryType != as->geometries[0].geometryType)
+            return bad(d, "mixed-geometry", "a bottom level holds either triangles or AABBs, not both", i);
+        total += primitives;
+    }
+    as->aabbs = info->geometryCount && as->geometries[0].geometryType == VK_GEOMETRY_TYPE_AABBS_NV;
+    if (total > MAX_PRIMITIVES)
+        return rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "maxTriangleCount", "%llu primitives; the limit is %u",
+                         (unsigned long long)total, MAX_PRIMITIVES);
+    as->primitive_count = (uint32_t)total;
+    return VK_SUCCESS;
+}
+
+VkResult rtrCreateAccelerationStructure(RtrDevice d, const VkAccelerationStructureCreateInfoNV* info,
+                                        const VkAllocationCallbacks* allocator, RtrAccelerationStructure* pAs) {
+    const VkAllocationCallbacks* a = rtr_pick(d, allocator);
+    RtrAccelerationStructure as;
+    VkResult r;
+    *pAs = NULL;
+    if (info->pNext || info->info.pNext)
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "pNext",
+                         "VkAccelerationStructureCreateInfoNV: pNext must be NULL");
+    if (info->compactedSize && (info->info.geometryCount || info->info.instanceCount))
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "compacted-size",
+                         "with compactedSize, geometryCount and instanceCount must be 0");
+    as = rtr_alloc(a, sizeof *as);
+    if (!as) return VK_ERROR_OUT_OF_HOST_MEMORY;
+    as->device = d;
+    r = fill_from_info(d, as, &info->info, a);
+    if (r != VK_SUCCESS) {
+        rtrDestroyAccelerationStructure(d, as, allocator);
+        return r;
+    }
+    as->compacted_size = info->compactedSize;
+    if (info->compactedSize) {
+        as->size = rtr_align(info->compactedSize, RTC_QUAD_BYTES);
+    } else {
+        as->size = RTC_QUAD_BYTES * (rtr_slots_quad(as->primitive_count) +
+                                     (VkDeviceSize)rtr_slot_quads(as) * as->primitive_count);
+    }
+    *pAs = as;
+    return VK_SUCCESS;
+}
+
+void rtrDestroyAccelerationStructure(RtrDevice d, RtrAccelerationStructure as,
+                                     const VkAllocationCallbacks* allocator) {
+    const VkAllocationCallbacks* a = rtr_pick(d, allocator);
+    if (!as) return;
+    rtr_free(a, as->geometries);
+    rtr_free(a, as);
+}
+
+void rtrGetAccelerationStructureMemoryRequirements(RtrDevice d, VkAccelerationStructureMemoryRequirementsTypeNV type,
+                                                   RtrAccelerationStructure as, VkMemoryRequirements2* out) {
+    RtrScratchLayout layout;
+    VkDeviceSize size = as->size;
+    (void)d;
+    if (type == VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_BUILD_SCRATCH_NV) {
+        rtr_build_scratch(as->primitive_count, &layout);
+        size = layout.total;
+    } else if (type == VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_UPDATE_SCRATCH_NV) {
+        rtr_update_scratch(as->primitive_count, as->geometry_count, &layout);
+        size = layout.total;
+    }
+    out->memoryRequirements.size = rtr_align(size, RTC_AS_ALIGNMENT);
+    out->memoryRequirements.alignment = RTC_AS_ALIGNMENT;
+    out->memoryRequirements.memoryTypeBits = 0xffffffffu;
+}
+
+VkResult rtrBindAccelerationStructureMemory(RtrDevice d, uint32_t count,
+                                            const RtrBindAccelerationStructureMemoryInfo* infos) {
+    uint32_t i;
+    for (i = 0; i < count; i++) {
+        const RtrBindAccelerationStructureMemoryInfo* b = &infos[i];
+        if (b->pNext)
+            return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "pNext",
+                             "RtrBindAccelerationStructureMemoryInfo::pNext must be NULL");
+        if (!b->accelerationStructure || !b->heap || b->accelerationStructure->heap)
+            return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "bind",
+                             "bind %u: needs an acceleration structure not bound yet, and a heap", i);
+        if (b->heapOffset == 0 || b->heapOffset % RTC_AS_ALIGNMENT)
+            return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "bind-offset",
+                             "bind %u: heapOffset %llu must be a multiple of 256 and not 0", i,
+                             (unsigned long long)b->heapOffset);
+        if (b->heapOffset > b->heap->size || b->accelerationStructure->size > b->heap->size - b->heapOffset)
+            return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "bind-range",
+                             "bind %u: %llu bytes at %llu do not fit a heap of %llu", i,
+                             (unsigned long long)b->accelerationStructure->size, (unsigned long long)b->heapOffset,
+                             (unsigned long long)b->heap->size);
+        b->accelerationStructure->heap = b->heap;
+        b->accelerationStructure->heap_offset = b->heapOffset;
+    }
+    return VK_SUCCESS;
+}
+
+VkResult rtrGetAccelerationStructureHandle(RtrDevice d, RtrAccelerationStructure as, size_t size, void* data) {
+    uint64_t base;
+    if (!as->heap) return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "not-bound", "handle of an unbound structure");
+    if (size < sizeof base)
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "handle-size", "dataSize must be 8 or more");
+    base = rtr_as_base(as);
+    memcpy(data, &base, sizeof base);
+    return VK_SUCCESS;
+}
+
+VkResult rtrGetAccelerationStructureDescriptor(RtrDevice d, RtrAccelerationStructure as, VkDescriptorBufferInfo* info) {
+    if (!as->heap)
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "not-bound", "descriptor of an unbound structure");
+    info->buffer = as->heap->buffer;
+    info->offset = as->heap->offset + as->heap_offset;
+    info->range = RTC_AS_HEADER_QUADS * RTC_QUAD_BYTES;
+    return VK_SUCCESS;
+}
+
+VkResult rtrGetNullAccelerationStructureDescriptor(RtrDevice d, RtrHeap heap, VkDescriptorBufferInfo* info) {
+    (void)d;
+    info->buffer = heap->buffer;
+    info->offset = heap->offset;
+    info->range = RTC_AS_HEADER_QUADS * RTC_QUAD_BYTES;
+    return VK_SUCCESS;
+}

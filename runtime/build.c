@@ -1,0 +1,281 @@
+/* rtrCmdBuildAccelerationStructure: which kernels run, in which order, on which arrays. */
+#include "build.h"
+
+static void place(RtrScratchLayout* l, uint32_t array, VkDeviceSize size) {
+    l->offset[array] = l->total;
+    l->size[array] = rtr_align(size ? size : 256, 256);
+    l->total += l->size[array];
+}
+
+void rtr_build_scratch(uint32_t n, RtrScratchLayout* l) {
+    VkDeviceSize sort_blocks = rtr_groups(n, RTR_SORT_BLOCK), groups = rtr_groups(n, RTR_GROUP);
+    VkDeviceSize sums = sort_blocks * RTR_SORT_BINS;
+    if (sums < 2 * groups) sums = 2 * groups;
+    memset(l, 0, sizeof *l);
+    place(l, RTR_ARR_STATE, 4 * (RTR_ST_SUMS + sums));
+    place(l, RTR_ARR_LEAF_BOX, 32ull * n);
+    place(l, RTR_ARR_NODE_BOX, 32ull * n);
+    place(l, RTR_ARR_INFO, 16ull * n);
+    place(l, RTR_ARR_PAIRS_A, 8ull * n);
+    place(l, RTR_ARR_PAIRS_B, 8ull * n);
+    place(l, RTR_ARR_LINKS, 8ull * n);
+    place(l, RTR_ARR_MARKS, 4ull * n);
+    place(l, RTR_ARR_OUT, 4ull * n);
+    place(l, RTR_ARR_SLOT_OF, 4ull * n);
+}
+
+void rtr_update_scratch(uint32_t n, uint32_t geometries, RtrScratchLayout* l) {
+    (void)geometries;
+    memset(l, 0, sizeof *l);
+    place(l, RTR_ARR_STATE, 4 * RTR_ST_SUMS);
+    place(l, RTR_ARR_LEAF_BOX, 32ull * n);
+    place(l, RTR_ARR_LINKS, 4ull * rtr_node_room(n));
+    place(l, RTR_ARR_MARKS, 4ull * (n > rtr_node_room(n) ? n : rtr_node_room(n)));
+}
+
+VkResult rtr_bind_arrays(RtrBuild* b, uint32_t nodes_at, uint32_t slots_at) {
+    RtrDevice d = b->device;
+    const VkDeviceSize limit = d->limits.maxStorageBufferRange;
+    const VkDeviceSize base = b->dst->heap->offset + b->dst->heap_offset;
+    const VkDeviceSize end = base + b->dst->size;
+    VkDescriptorBufferInfo infos[RTR_ARR_COUNT];
+    VkWriteDescriptorSet writes[RTR_ARR_COUNT];
+    uint32_t i, count = 0;
+    VkResult r = rtr_allocate_set(b->recorder, d->array_layout, &b->arrays);
+    if (r != VK_SUCCESS) return r;
+    memset(writes, 0, sizeof writes);
+    for (i = 0; i < RTR_ARR_COUNT; i++) {
+        VkDescriptorBufferInfo* info = &infos[i];
+        if (i == RTR_ARR_DST_HEADER) {
+            info->buffer = b->dst->heap->buffer;
+            info->offset = base;
+            info->range = RTC_AS_HEADER_QUADS * RTC_QUAD_BYTES;
+        } else if (i == RTR_ARR_DST_NODES) {
+            info->buffer = b->dst->heap->buffer;
+            info->offset = base + RTC_QUAD_BYTES * (RTC_AS_HEADER_QUADS + (VkDeviceSize)RTC_NODE_QUADS * nodes_at);
+            info->range = rtr_min_size(limit, base + RTC_QUAD_BYTES * (VkDeviceSize)b->slots_quad - info->offset);
+        } else if (i == RTR_ARR_DST_SLOTS) {
+            info->buffer = b->dst->heap->buffer;
+            info->offset =
+                base + RTC_QUAD_BYTES * (b->slots_quad + (VkDeviceSize)rtr_slot_quads(b->dst) * slots_at);
+            if (info->offset >= end) continue; /* no slots at all */
+            info->range = rtr_min_size(limit, end - info->offset);
+        } else {
+            if (!b->layout.size[i]) continue;
+            info->buffer = b->scratch;
+            info->offset = b->scratch_offset + b->layout.offset[i];
+            info->range = rtr_min_size(limit, b->layout.size[i]);
+        }
+        writes[count].sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
+        writes[count].dstSet = b->arrays;
+        writes[count].dstBinding = i;
+        writes[count].descriptorCount = 1;
+        writes[count].descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+        writes[count].pBufferInfo = info;
+        count++;
+    }
+    d->vk.UpdateDescriptorSets(d->device, count, writes, 0, NULL);
+    d->vk.CmdBindDescriptorSets(b->recorder->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, d->kernel_layout, 1, 1, &b->arrays, 0,
+                                NULL);
+    return VK_SUCCESS;
+}
+
+static void set_kernel(RtrBuild* b, RtrKernel kernel) {
+    RtrDevice d = b->device;
+    d->vk.CmdBindPipeline(b->recorder->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, d->kernels[kernel]);
+    d->vk.CmdPushConstants(b->recorder->cmd, d->kernel_layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof b->push, &b->push);
+}
+
+/* Every dispatch is followed by a barrier: the steps of a build depend on each other. */
+void rtr_dispatch(RtrBuild* b, RtrKernel kernel, uint64_t groups) {
+    uint32_t x = groups < RTC_MAX_GROUPS_X ? (uint32_t)groups : RTC_MAX_GROUPS_X;
+    if (groups == 0) return;
+    set_kernel(b, kernel);
+    b->device->vk.CmdDispatch(b->recorder->cmd, x, rtr_groups(groups, RTC_MAX_GROUPS_X), 1);
+    rtr_compute_barrier(b->recorder);
+}
+
+void rtr_dispatch_indirect(RtrBuild* b, RtrKernel kernel, uint32_t state_word) {
+    set_kernel(b, kernel);
+    b->device->vk.CmdDispatchIndirect(b->recorder->cmd, b->scratch,
+                                      b->scratch_offset + b->layout.offset[RTR_ARR_STATE] + 4ull * state_word);
+    rtr_compute_barrier(b->recorder);
+}
+
+static VkResult emit_leaves(RtrBuild* b) {
+    RtrKernel kernel = RTR_KERNEL_leaf_triangles;
+    if (b->push.flags & RTR_BUILD_AABBS) kernel = RTR_KERNEL_leaf_aabbs;
+    if (b->push.flags & RTR_BUILD_TOP) {
+        /* The records go straight to their place; a piece of the input is one window of them. */
+        VkResult r = rtr_bind_arrays(b, 0, b->push.first);
+        if (r != VK_SUCCESS) return r;
+        b->push.window_first = b->push.first;
+        b->push.window_count = b->push.count;
+        rtr_dispatch(b, RTR_KERNEL_leaf_instances, rtr_groups(b->push.count, RTR_GROUP));
+        return VK_SUCCESS;
+    }
+    rtr_dispatch(b, kernel, rtr_groups(b->push.count, RTR_GROUP));
+    return VK_SUCCESS;
+}
+
+static VkResult emit_slots(RtrBuild* b) {
+    rtr_dispatch(b, (b->push.flags & RTR_BUILD_AABBS) ? RTR_KERNEL_encode_aabbs : RTR_KERNEL_encode_triangles,
+                 rtr_groups(b->push.count, RTR_GROUP));
+    return VK_SUCCESS;
+}
+
+static void sort(RtrBuild* b) {
+    uint32_t shift;
+    b->push.blocks = rtr_groups(b->primitives, RTR_SORT_BLOCK);
+    for (shift = 0; shift < 32; shift += RTR_SORT_BITS) {
+        b->push.step = shift;
+        rtr_dispatch(b, RTR_KERNEL_sort_count, b->push.blocks);
+        rtr_dispatch(b, RTR_KERNEL_sort_scan, 1);
+        rtr_dispatch(b, RTR_KERNEL_sort_scatter, b->push.blocks);
+    }
+}
+
+static void lbvh(RtrBuild* b) {
+    uint32_t groups = rtr_groups(b->primitives, RTR_GROUP);
+    rtr_dispatch(b, RTR_KERNEL_lbvh_topology, groups);
+    rtr_dispatch(b, RTR_KERNEL_lbvh_fit, groups);
+    b->push.blocks = rtr_groups(b->primitives, RTR_SCAN_BLOCK);
+    rtr_dispatch(b, RTR_KERNEL_number_count, b->push.blocks);
+    rtr_dispatch(b, RTR_KERNEL_number_scan, 1);
+    rtr_dispatch(b, RTR_KERNEL_number, b->push.blocks);
+}
+
+static VkResult record_build(RtrBuild* b) {
+    uint32_t groups = rtr_groups(b->primitives, RTR_GROUP), at;
+    VkResult r = rtr_bind_arrays(b, 0, 0);
+    if (r != VK_SUCCESS) return r;
+    rtr_dispatch(b, RTR_KERNEL_init, 1);
+    if ((r = rtr_for_each_input(b, emit_leaves)) != VK_SUCCESS) return r;
+    if (b->primitives) {
+        rtr_dispatch(b, RTR_KERNEL_morton, groups);
+        sort(b);
+        lbvh(b);
+    }
+    for (at = 0; at < rtr_node_room(b->primitives); at += b->node_window) {
+        if ((r = rtr_bind_arrays(b, at, 0)) != VK_SUCCESS) return r;
+        b->push.window_first = at;
+        b->push.window_count = b->node_window;
+        rtr_dispatch(b, RTR_KERNEL_encode_nodes, groups ? groups : 1);
+    }
+    if (!(b->push.flags & RTR_BUILD_TOP)) {
+        for (at = 0; at < b->primitives; at += b->slot_window) {
+            if ((r = rtr_bind_arrays(b, 0, at)) != VK_SUCCESS) return r;
+            b->push.window_first = at;
+            b->push.window_count = b->slot_window;
+            if ((r = rtr_for_each_input(b, emit_slots)) != VK_SUCCESS) return r;
+        }
+    }
+    rtr_dispatch(b, RTR_KERNEL_header, 1);
+    /* The next build may write this scratch again after a barrier on compute alone. */
+    rtr_barrier(b->recorder, VK_PIPELINE_STAGE_DRAW_INDIRECT_BIT, 0, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, 0);
+    return VK_SUCCESS;
+}
+
+static uint32_t window_of(RtrDevice d, uint32_t bytes_each) {
+    /* Whole multiples of 16 entries keep the next window aligned to 256 bytes. */
+    return d->limits.maxStorageBufferRange / bytes_each / 16u * 16u;
+}
+
+static VkResult check_build(RtrBuild* b, const VkAccelerationStructureInfoNV* info, VkBool32 update,
+                            RtrAccelerationStructure src) {
+    RtrDevice d = b->device;
+    RtrAccelerationStructure dst = b->dst;
+    const bool top = info->type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV;
+    uint64_t total = 0;
+    uint32_t g;
+    if (!b->recorder->cmd)
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "recorder-not-begun", "build: rtrBeginRecorder first");
+    if (info->pNext)
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "pNext", "VkAccelerationStructureInfoNV::pNext must be NULL");
+    if (!dst || !dst->heap) return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "not-bound", "build: dst is not bound");
+    if (info->type != dst->type || info->flags != dst->flags)
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "as-info", "build: type or flags differ from dst's creation");
+    if (dst->compacted_size)
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "compacted-size",
+                         "build: dst was created with compactedSize, for copies only");
+    if (!b->scratch || b->scratch_offset % 256)
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "scratch",
+                         "build: scratch buffer missing or scratchOffset not a multiple of 256");
+    if (update && !(dst->flags & VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV))
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "update-not-allowed",
+                         "update of a structure without ALLOW_UPDATE");
+    if (update && src && (src->type != dst->type || src->primitive_count != dst->primitive_count || !src->heap))
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "update-src", "update: src does not match dst");
+    if (top) {
+        if (info->instanceCount > dst->instance_count || (update && info->instanceCount != dst->instance_count))
+            return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "as-counts", "build of %u instances; created for %u",
+                             info->instanceCount, dst->instance_count);
+        if (info->instanceCount && (!b->instance_data || b->instance_offset % 16))
+            return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "instance-data",
+                             "instanceData missing or instanceOffset not a multiple of 16");
+        b->primitives = info->instanceCount;
+    } else {
+        if (info->geometryCount > dst->geometry_count || (update && info->geometryCount != dst->geometry_count))
+            return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "as-counts", "build of %u geometries; created for %u",
+                             info->geometryCount, dst->geometry_count);
+        for (g = 0; g < info->geometryCount; g++) {
+            uint32_t n = 0, made = 0;
+            VkResult r = rtr_check_geometry(d, &info->pGeometries[g], g, &n);
+            if (r != VK_SUCCESS) return r;
+            rtr_check_geometry(d, &dst->geometries[g], g, &made);
+            if (info->pGeometries[g].geometryType != dst->geometries[g].geometryType || n > made ||
+                (update && (n != made || info->pGeometries[g].flags != dst->geometries[g].flags)))
+                return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "as-geometry",
+                                 "geometry %u: type, flags or count (%u) do not fit its creation (%u)", g, n, made);
+            total += n;
+        }
+        b->primitives = (uint32_t)total;
+    }
+    if ((VkDeviceSize)b->primitives * 32 > d->limits.maxStorageBufferRange)
+        return rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "maxStorageBufferRange",
+                         "build of %u primitives: maxStorageBufferRange %u allows %u", b->primitives,
+                         d->limits.maxStorageBufferRange, d->limits.maxStorageBufferRange / 32);
+    return VK_SUCCESS;
+}
+
+VkResult rtrCmdBuildAccelerationStructure(RtrRecorder recorder, const VkAccelerationStructureInfoNV* info,
+                                          VkBuffer instanceData, VkDeviceSize instanceOffset, VkBool32 update,
+                                          RtrAccelerationStructure dst, RtrAccelerationStructure src, VkBuffer scratch,
+                                          VkDeviceSize scratchOffset) {
+    RtrBuild b;
+    uint32_t g;
+    bool opaque = true;
+    VkResult r;
+    memset(&b, 0, sizeof b);
+    b.recorder = recorder;
+    b.device = recorder->device;
+    b.dst = dst;
+    b.scratch = scratch;
+    b.scratch_offset = scratchOffset;
+    b.instance_data = instanceData;
+    b.instance_offset = instanceOffset;
+    if ((r = check_build(&b, info, update, src)) != VK_SUCCESS) return r;
+    b.geometries = info->pGeometries;
+    b.geometry_count = info->geometryCount;
+    b.slots_quad = rtr_slots_quad(dst->primitive_count);
+    b.node_window = window_of(b.device, RTC_NODE_QUADS * RTC_QUAD_BYTES);
+    b.slot_window = window_of(b.device, rtr_slot_quads(dst) * RTC_QUAD_BYTES);
+    b.push.total = b.primitives;
+    b.push.self_lo = (uint32_t)rtr_as_base(dst);
+    b.push.self_hi = (uint32_t)(rtr_as_base(dst) >> 32);
+    b.push.slots_quad = b.slots_quad;
+    b.push.slot_quads = rtr_slot_quads(dst);
+    b.push.build_flags = info->flags;
+    b.push.geometry_count = info->geometryCount;
+    if (dst->type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV) b.push.flags |= RTR_BUILD_TOP;
+    if (dst->aabbs) b.push.flags |= RTR_BUILD_AABBS;
+    if (info->flags & VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV) b.push.flags |= RTR_BUILD_KEEP_DEGENERATE;
+    for (g = 0; g < info->geometryCount; g++) opaque = opaque && (info->pGeometries[g].flags & VK_GEOMETRY_OPAQUE_BIT_NV);
+    b.push.facts = (dst->aabbs ? RTC_FACT_AABBS : 0u) | (opaque ? RTC_FACT_ALL_OPAQUE : 0u);
+    if (update) {
+        rtr_update_scratch(dst->primitive_count, dst->geometry_count, &b.layout);
+        return rtr_error(b.device, VK_ERROR_FEATURE_NOT_PRESENT, "update", "update is not implemented yet");
+    }
+    rtr_build_scratch(dst->primitive_count, &b.layout);
+    return record_build(&b);
+}

@@ -1,0 +1,41 @@
+/* Recording of builds: shared between build, update and copy. */
+#ifndef RTR_BUILD_H_
+#define RTR_BUILD_H_
+
+#include "internal.h"
+
+/* A build being recorded. */
+typedef struct RtrBuild {
+    RtrRecorder recorder;
+    RtrDevice device;
+    RtrAccelerationStructure dst;
+    VkBuffer scratch;
+    VkDeviceSize scratch_offset;
+    RtrScratchLayout layout;
+    VkBuffer instance_data;
+    VkDeviceSize instance_offset;
+    const VkGeometryNV* geometries;
+    uint32_t geometry_count;
+    uint32_t primitives; /* of this build: at most those of dst */
+    uint32_t slots_quad;
+    struct RtrBuildPush push;
+    uint32_t node_window, slot_window; /* nodes, slots one binding reaches */
+    VkDescriptorSet arrays;            /* bound now */
+} RtrBuild;
+
+VkResult rtr_check_geometry(RtrDevice d, const VkGeometryNV* g, unsigned index, uint32_t* primitives);
+
+/* Set 1 with node window `nodes_at` and slot window `slots_at` (first node, first slot);
+ * arrays of size 0 in the layout are left out. */
+VkResult rtr_bind_arrays(RtrBuild* b, uint32_t nodes_at, uint32_t slots_at);
+void rtr_dispatch(RtrBuild* b, RtrKernel kernel, uint64_t groups);
+void rtr_dispatch_indirect(RtrBuild* b, RtrKernel kernel, uint32_t state_word);
+
+/* Calls `emit` for every piece of the inputs that one set of bindings reaches, with set 0
+ * bound and the push constants of the piece filled in. */
+typedef VkResult (*RtrInputFunction)(RtrBuild* b);
+VkResult rtr_for_each_input(RtrBuild* b, RtrInputFunction emit);
+
+VkResult rtr_record_update(RtrBuild* b, RtrAccelerationStructure src);
+
+#endif /* RTR_BUILD_H_ */

@@ -1,0 +1,64 @@
+/* Host memory through the application's callbacks, and messages to its messenger. */
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "internal.h"
+
+void* rtr_alloc(const VkAllocationCallbacks* allocator, size_t size) {
+    void* memory;
+    if (size == 0) size = 1;
+    if (allocator) {
+        memory = allocator->pfnAllocation(allocator->pUserData, size, 16, VK_SYSTEM_ALLOCATION_SCOPE_OBJECT);
+    } else {
+        memory = malloc(size);
+    }
+    if (memory) memset(memory, 0, size);
+    return memory;
+}
+
+void rtr_free(const VkAllocationCallbacks* allocator, void* memory) {
+    if (!memory) return;
+    if (allocator) {
+        allocator->pfnFree(allocator->pUserData, memory);
+    } else {
+        free(memory);
+    }
+}
+
+const VkAllocationCallbacks* rtr_pick(RtrDevice device, const VkAllocationCallbacks* allocator) {
+    if (allocator) return allocator;
+    return device && device->has_allocator ? &device->allocator : NULL;
+}
+
+static void send(RtrDevice device, VkDebugUtilsMessageSeverityFlagBitsEXT severity, const char* id, const char* format,
+                 va_list arguments) {
+    char text[1024];
+    VkDebugUtilsMessengerCallbackDataEXT data;
+    if (!device || !device->message_callback || !(device->message_severities & severity) ||
+        !(device->message_types & VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT)) {
+        return;
+    }
+    vsnprintf(text, sizeof text, format, arguments);
+    memset(&data, 0, sizeof data);
+    data.sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CALLBACK_DATA_EXT;
+    data.pMessageIdName = id;
+    data.pMessage = text;
+    device->message_callback(severity, VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT, &data,
+                             device->message_user_data);
+}
+
+VkResult rtr_error(RtrDevice device, VkResult result, const char* id, const char* format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    send(device, VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT, id, format, arguments);
+    va_end(arguments);
+    return result;
+}
+
+void rtr_warning(RtrDevice device, const char* id, const char* format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    send(device, VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT, id, format, arguments);
+    va_end(arguments);
+}

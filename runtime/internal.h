@@ -1,0 +1,288 @@
+/* Inside of the runtime: object layouts and small helpers. */
+#ifndef RTR_INTERNAL_H_
+#define RTR_INTERNAL_H_
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "kernels/build_shared.h"
+#include "rtc/abi.h"
+#include "rtc/runtime.h"
+
+/* ---- Entry points: everything the runtime calls, loaded by name --------------- */
+#define RTR_INSTANCE_FUNCTIONS(X)     \
+    X(GetPhysicalDeviceProperties2)   \
+    X(GetPhysicalDeviceFeatures2)     \
+    X(GetPhysicalDeviceFormatProperties) \
+    X(EnumerateDeviceExtensionProperties) \
+    X(GetDeviceProcAddr)
+
+#define RTR_DEVICE_FUNCTIONS(X)   \
+    X(CreateBufferView)           \
+    X(DestroyBufferView)          \
+    X(CreateShaderModule)         \
+    X(DestroyShaderModule)        \
+    X(CreateComputePipelines)     \
+    X(DestroyPipeline)            \
+    X(CreatePipelineLayout)       \
+    X(DestroyPipelineLayout)      \
+    X(CreateDescriptorSetLayout)  \
+    X(DestroyDescriptorSetLayout) \
+    X(CreateDescriptorPool)       \
+    X(DestroyDescriptorPool)      \
+    X(ResetDescriptorPool)        \
+    X(AllocateDescriptorSets)     \
+    X(UpdateDescriptorSets)       \
+    X(CmdBindPipeline)            \
+    X(CmdBindDescriptorSets)      \
+    X(CmdPushConstants)           \
+    X(CmdDispatch)                \
+    X(CmdDispatchIndirect)        \
+    X(CmdPipelineBarrier)         \
+    X(CmdUpdateBuffer)            \
+    X(CmdFillBuffer)              \
+    X(CmdCopyBuffer)
+
+typedef struct RtrInstanceTable {
+#define X(name) PFN_vk##name name;
+    RTR_INSTANCE_FUNCTIONS(X)
+#undef X
+} RtrInstanceTable;
+
+typedef struct RtrDeviceTable {
+#define X(name) PFN_vk##name name;
+    RTR_DEVICE_FUNCTIONS(X)
+#undef X
+} RtrDeviceTable;
+
+/* Names of the first missing function in *missing. */
+bool rtr_load_instance_table(VkInstance instance, PFN_vkGetInstanceProcAddr get, RtrInstanceTable* table,
+                             const char** missing);
+bool rtr_load_device_table(const RtrInstanceTable* instance, VkDevice device, RtrDeviceTable* table,
+                           const char** missing);
+
+/* ---- Kernels ------------------------------------------------------------------- */
+#define RTR_KERNELS(X)  \
+    X(init)             \
+    X(leaf_triangles)   \
+    X(leaf_aabbs)       \
+    X(leaf_instances)   \
+    X(morton)           \
+    X(sort_count)       \
+    X(sort_scan)        \
+    X(sort_scatter)     \
+    X(lbvh_topology)    \
+    X(lbvh_fit)         \
+    X(number_count)     \
+    X(number_scan)      \
+    X(number)           \
+    X(encode_nodes)     \
+    X(encode_triangles) \
+    X(encode_aabbs)     \
+    X(header)
+
+typedef enum RtrKernel {
+#define X(name) RTR_KERNEL_##name,
+    RTR_KERNELS(X)
+#undef X
+    RTR_KERNEL_COUNT
+} RtrKernel;
+
+typedef struct RtrKernelCode {
+    const char* name;
+    const uint32_t* words;
+    size_t bytes;
+} RtrKernelCode;
+const RtrKernelCode* rtr_kernel_code(RtrKernel kernel);
+
+/* ---- Objects --------------------------------------------------------------------- */
+struct RtrDevice_T {
+    VkAllocationCallbacks allocator;
+    bool has_allocator;
+    VkInstance instance;
+    VkPhysicalDevice physical_device;
+    VkDevice device;
+    RtrInstanceTable vki;
+    RtrDeviceTable vk;
+    VkDebugUtilsMessageSeverityFlagsEXT message_severities;
+    VkDebugUtilsMessageTypeFlagsEXT message_types;
+    PFN_vkDebugUtilsMessengerCallbackEXT message_callback;
+    void* message_user_data;
+    VkPhysicalDeviceLimits limits;
+    RtrPhysicalDeviceSupport support;
+
+    VkDescriptorSetLayout input_layout; /* set 0 of the kernels */
+    VkDescriptorSetLayout array_layout; /* set 1 */
+    VkDescriptorSetLayout empty_layout;
+    VkPipelineLayout kernel_layout;
+    VkPipeline kernels[RTR_KERNEL_COUNT];
+};
+
+typedef struct RtrHeapRange {
+    VkDeviceSize offset, size;
+} RtrHeapRange;
+
+struct RtrHeap_T {
+    RtrDevice device;
+    VkAllocationCallbacks allocator;
+    bool has_allocator;
+    VkBuffer buffer;
+    VkDeviceSize offset, size;
+    VkBufferView view;
+    RtrHeapRange* used; /* sorted by offset */
+    uint32_t used_count, used_capacity;
+};
+
+struct RtrAccelerationStructure_T {
+    RtrDevice device;
+    VkAccelerationStructureTypeNV type;
+    VkBuildAccelerationStructureFlagsNV flags;
+    VkDeviceSize compacted_size;
+    uint32_t instance_count;
+    uint32_t geometry_count;
+    VkGeometryNV* geometries;
+    uint32_t primitive_count; /* instances of a top level */
+    bool aabbs;
+    VkDeviceSize size; /* of the object */
+    RtrHeap heap;
+    VkDeviceSize heap_offset;
+};
+
+#define RTR_POOL_SETS 64u
+typedef struct RtrPool {
+    struct RtrPool* next;
+    VkDescriptorPool pool;
+} RtrPool;
+
+typedef struct RtrSetCall {
+    uint32_t first, count, dynamic_count;
+    VkDescriptorSet* sets; /* in the recorder's arrays */
+    uint32_t* dynamics;
+} RtrSetCall;
+
+#define RTR_MAX_SET_CALLS 32u
+#define RTR_MAX_SETS_PER_CALL 32u
+#define RTR_MAX_DYNAMICS_PER_CALL 64u
+#define RTR_MAX_PUSH_BYTES 4096u
+#define RTR_DEFAULT_ROUNDS 64u
+
+typedef struct RtrBoundSets {
+    uint32_t first, count, dynamic_count;
+    VkDescriptorSet sets[RTR_MAX_SETS_PER_CALL];
+    uint32_t dynamics[RTR_MAX_DYNAMICS_PER_CALL];
+} RtrBoundSets;
+
+typedef struct RtrLaunchPlace {
+    VkDeviceSize offset, size; /* in the control buffer */
+} RtrLaunchPlace;
+
+struct RtrRecorder_T {
+    RtrDevice device;
+    VkAllocationCallbacks allocator;
+    bool has_allocator;
+    VkCommandBuffer cmd;
+    VkBuffer control;
+    VkDeviceSize control_offset, control_size, control_used;
+    RtrPool* pools;        /* all, newest use first */
+    RtrPool* current_pool; /* sets come from here; later ones are unused */
+    RtrLaunchPlace* launches;
+    uint32_t launch_count, launch_capacity;
+
+    RtrPipeline pipeline;
+    RtrHeap heap;
+    VkBuffer scratch;
+    VkDeviceSize scratch_offset, scratch_size;
+    uint64_t max_tile_lanes;
+    uint32_t max_rounds;
+    uint32_t set_call_count;
+    RtrBoundSets set_calls[RTR_MAX_SET_CALLS];
+    uint32_t push_size;
+    uint32_t push_words[RTR_MAX_PUSH_BYTES / 4];
+};
+
+struct RtrPipeline_T {
+    RtrDevice device;
+    RtcModuleHeader header;
+    RtcModuleGroup* groups;
+    char* json;
+    RtrTraceOptions options;
+    bool reserved_in_app_set;
+    uint32_t set_layout_count;
+    uint32_t push_size;
+    VkDescriptorSetLayout reserved_layout;
+    VkPipelineLayout layout;
+    VkPipeline pipeline;
+};
+
+/* ---- Memory and messages ---------------------------------------------------------- */
+/* The allocator in force: the given one, else the device's, else malloc. */
+void* rtr_alloc(const VkAllocationCallbacks* allocator, size_t size);
+void rtr_free(const VkAllocationCallbacks* allocator, void* memory);
+const VkAllocationCallbacks* rtr_pick(RtrDevice device, const VkAllocationCallbacks* allocator);
+
+#if defined(__GNUC__)
+#define RTR_PRINTF(f, a) __attribute__((format(__printf__, f, a)))
+#else
+#define RTR_PRINTF(f, a)
+#endif
+/* Sends an error with a stable name through the messenger and returns `result`. */
+VkResult rtr_error(RtrDevice device, VkResult result, const char* id, const char* format, ...) RTR_PRINTF(4, 5);
+void rtr_warning(RtrDevice device, const char* id, const char* format, ...) RTR_PRINTF(3, 4);
+
+/* ---- Recording helpers ---------------------------------------------------------------- */
+VkResult rtr_allocate_set(RtrRecorder recorder, VkDescriptorSetLayout layout, VkDescriptorSet* set);
+void rtr_barrier(RtrRecorder recorder, VkPipelineStageFlags src, VkAccessFlags src_access,
+                 VkPipelineStageFlags dst, VkAccessFlags dst_access);
+/* Compute writes to compute reads and writes, and to indirect arguments. */
+void rtr_compute_barrier(RtrRecorder recorder);
+
+static inline VkDeviceSize rtr_align(VkDeviceSize value, VkDeviceSize alignment) {
+    return (value + alignment - 1) / alignment * alignment;
+}
+static inline VkDeviceSize rtr_min_size(VkDeviceSize a, VkDeviceSize b) { return a < b ? a : b; }
+static inline uint32_t rtr_groups(uint64_t lanes, uint32_t group) { return (uint32_t)((lanes + group - 1) / group); }
+
+/* Scratch of a build: offset and size of each RTR_ARR_* array (0 size: of the destination). */
+typedef struct RtrScratchLayout {
+    VkDeviceSize offset[RTR_ARR_COUNT];
+    VkDeviceSize size[RTR_ARR_COUNT];
+    VkDeviceSize total;
+} RtrScratchLayout;
+void rtr_build_scratch(uint32_t primitives, RtrScratchLayout* layout);
+void rtr_update_scratch(uint32_t primitives, uint32_t geometries, RtrScratchLayout* layout);
+
+static inline uint64_t rtr_as_base(const struct RtrAccelerationStructure_T* as) {
+    return as->heap_offset / RTC_QUAD_BYTES;
+}
+static inline uint32_t rtr_slot_quads(const struct RtrAccelerationStructure_T* as) {
+    if (as->type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV) return RTC_INSTANCE_QUADS;
+    return as->aabbs ? RTC_AABB_QUADS : RTC_TRIANGLE_QUADS;
+}
+/* Nodes a structure of n primitives is given room for: a binary tree's inner nodes,
+ * rounded to 256 bytes so that the slots behind them can be bound as a window. */
+static inline uint32_t rtr_node_room(uint32_t primitives) {
+    return ((primitives > 2 ? primitives - 1 : 1) + 3u) & ~3u;
+}
+/* Quads from the base to slot 0 in a structure that was built, not compacted. */
+static inline uint32_t rtr_slots_quad(uint32_t primitives) {
+    return RTC_AS_HEADER_QUADS + RTC_NODE_QUADS * rtr_node_room(primitives);
+}
+
+/* What the reflection of a module says; strings point into one allocation. */
+typedef struct RtrModule {
+    RtcModuleHeader header;
+    RtcModuleGroup* groups;
+    char* json;
+    /* Descriptors the module declares, by kind, and push-constant bytes. */
+    uint32_t storage_buffers, uniform_buffers, sampled_images, storage_images, samplers, input_attachments, total;
+} RtrModule;
+VkResult rtr_parse_module(RtrDevice device, const uint32_t* code, size_t size, const VkAllocationCallbacks* allocator,
+                          RtrModule* module);
+void rtr_free_module(const VkAllocationCallbacks* allocator, RtrModule* module);
+
+/* Layout bindings of the reserved set that `used` names, at `base`; returns their number. */
+uint32_t rtr_reserved_bindings(uint32_t used, uint32_t base, VkDescriptorSetLayoutBinding* bindings);
+
+#endif /* RTR_INTERNAL_H_ */

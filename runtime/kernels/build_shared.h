@@ -1,0 +1,113 @@
+/* What the build kernels and the C code that records them agree on. Included by
+ * both C and GLSL; nothing here is visible outside the runtime. */
+#ifndef RTR_BUILD_SHARED_H_
+#define RTR_BUILD_SHARED_H_
+
+#ifdef RTR_GLSL
+#define RTR_UINT uint
+#else
+#include <stdint.h>
+#define RTR_UINT uint32_t
+#endif
+
+#define RTR_GROUP 256u /* lanes of every build workgroup */
+
+/* Set 0: inputs of one geometry. Set 1: the build's arrays. */
+#define RTR_IN_DATA 0u      /* vertices, AABBs or instances, as words */
+#define RTR_IN_INDEX 1u     /* indices, as words */
+#define RTR_IN_TRANSFORM 2u /* 3x4 matrix */
+#define RTR_IN_HEAP 3u      /* uniform texel buffer: AS heap */
+#define RTR_IN_COUNT 4u
+
+#define RTR_ARR_STATE 0u    /* RTR_ST_* words, then block sums and histograms */
+#define RTR_ARR_LEAF_BOX 1u /* by primitive: min.xyz, active (0/1 as float); max.xyz, 0 */
+#define RTR_ARR_NODE_BOX 2u /* by inner node: min.xyz, SAH cost; max.xyz, inner count | height << 26 */
+#define RTR_ARR_INFO 3u     /* by inner node: left, right, first slot, primitives | collapsed << 31 */
+#define RTR_ARR_PAIRS_A 4u  /* (Morton code, primitive), sorted after the sort */
+#define RTR_ARR_PAIRS_B 5u
+#define RTR_ARR_LINKS 6u    /* LBVH: parents (inner, then leaves); PLOC: two cluster lists */
+#define RTR_ARR_MARKS 7u    /* LBVH: arrival counters; PLOC: neighbour and role; refit: arrivals */
+#define RTR_ARR_OUT 8u      /* by inner node: index of the encoded node */
+#define RTR_ARR_SLOT_OF 9u  /* by primitive: its slot */
+#define RTR_ARR_DST_NODES 10u
+#define RTR_ARR_DST_SLOTS 11u
+#define RTR_ARR_DST_HEADER 12u
+#define RTR_ARR_COUNT 13u
+
+/* Children of INFO: RTR_CHILD_LEAF | primitive, or an inner node. */
+#define RTR_CHILD_LEAF 0x80000000u
+#define RTR_COLLAPSED 0x80000000u
+#define RTR_HEIGHT_SHIFT 26u
+#define RTR_INNER_MASK 0x03ffffffu
+
+/* State words. Floats that are reduced with atomics are order-preserving uints. */
+#define RTR_ST_CENTER_MIN 0u /* 3: bounds of (min + max) of the active boxes */
+#define RTR_ST_CENTER_MAX 3u
+#define RTR_ST_ACTIVE 6u
+#define RTR_ST_BROKEN 7u   /* RTC_FACT_* that do not hold */
+#define RTR_ST_OFFENDER 8u
+#define RTR_ST_HAS 9u      /* RTC_FACT_HAS_* */
+#define RTR_ST_NODES 10u   /* encoded nodes */
+#define RTR_ST_ROOT 11u    /* inner node that is the root */
+#define RTR_ST_ITER 64u    /* PLOC: RTR_ITER_WORDS words per iteration, up to 64 iterations and one */
+#define RTR_ITER_WORDS 8u
+#define RTR_ITER_ARGS 0u   /* groups x, y, z of search and merge */
+#define RTR_ITER_COUNT 3u  /* clusters */
+#define RTR_ITER_PARITY 4u /* which cluster list */
+#define RTR_ITER_NODES 5u  /* inner nodes made before this iteration */
+#define RTR_ST_LEVEL 640u  /* PLOC: 4 words per iteration: dispatch args of its top-down pass */
+#define RTR_ST_SUMS 1024u  /* block sums and histograms start here */
+
+#define RTR_SORT_ITEMS 8u
+#define RTR_SORT_BLOCK (RTR_GROUP * RTR_SORT_ITEMS)
+#define RTR_SORT_BITS 4u
+#define RTR_SORT_BINS 16u
+#define RTR_SCAN_ITEMS 8u
+#define RTR_SCAN_BLOCK (RTR_GROUP * RTR_SCAN_ITEMS)
+
+#define RTR_PLOC_RADIUS 8u
+#define RTR_PLOC_FINAL RTR_GROUP /* clusters the one-workgroup kernel finishes */
+#define RTR_PLOC_MAX_ITERATIONS 60u
+
+#define RTR_INACTIVE_KEY 0x7fffffffu
+
+#define RTR_INDEX_NONE 0u
+#define RTR_INDEX_16 1u
+#define RTR_INDEX_32 2u
+
+#define RTR_BUILD_TOP 1u
+#define RTR_BUILD_AABBS 2u
+#define RTR_BUILD_KEEP_DEGENERATE 4u /* ALLOW_UPDATE: only NaN drops a primitive */
+#define RTR_BUILD_PLOC 8u
+#define RTR_BUILD_HAS_TRANSFORM 16u
+
+struct RtrBuildPush {
+    RTR_UINT count;          /* primitives of this dispatch */
+    RTR_UINT total;          /* primitives of the build */
+    RTR_UINT first;          /* of this dispatch among the build's */
+    RTR_UINT primitive_base; /* of this dispatch within its geometry */
+    RTR_UINT geometry;       /* index | RTC_SLOT_* */
+    RTR_UINT data_offset;    /* bytes into RTR_IN_DATA of primitive_base's input (AABBs, instances) or of vertex 0 */
+    RTR_UINT data_stride;    /* bytes */
+    RTR_UINT vertex_count;
+    RTR_UINT index_offset;   /* bytes into RTR_IN_INDEX of the geometry's first index */
+    RTR_UINT index_type;
+    RTR_UINT transform_offset; /* bytes into RTR_IN_TRANSFORM */
+    RTR_UINT flags;          /* RTR_BUILD_* */
+    RTR_UINT step;           /* sort: bit shift; PLOC: iteration; final: iterations left */
+    RTR_UINT blocks;
+    RTR_UINT window_first;   /* first node or slot of the window */
+    RTR_UINT window_count;
+    RTR_UINT self_lo;        /* base of the destination, in quads */
+    RTR_UINT self_hi;
+    RTR_UINT facts;          /* header: facts as far as the host knows them */
+    RTR_UINT geometry_count;
+    RTR_UINT build_flags;    /* header: VkBuildAccelerationStructureFlagsNV */
+    RTR_UINT slots_quad;     /* quads from the base to slot 0 */
+    RTR_UINT slot_quads;     /* quads of a slot */
+    RTR_UINT src_lo;         /* copy and refit: base of the source */
+    RTR_UINT src_hi;
+    RTR_UINT pad[3];
+};
+
+#endif /* RTR_BUILD_SHARED_H_ */

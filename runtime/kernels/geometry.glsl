@@ -1,0 +1,48 @@
+// Reading the application's geometry. The box kernel and the slot kernel both come
+// here, and `precise` makes their vertices the same bits.
+
+uint read_index(uint i) {
+    if (p.index_type == RTR_INDEX_NONE) return i;
+    if (p.index_type == RTR_INDEX_32) return in_index[(p.index_offset >> 2) + i];
+    uint byte = p.index_offset + 2u * i;
+    return (in_index[byte >> 2] >> (8u * (byte & 2u))) & 0xffffu;
+}
+
+vec3 read_vertex(uint index) {
+    // An index beyond the vertex count is the application's error; never read outside.
+    index = min(index, p.vertex_count - 1u);
+    uint w = (p.data_offset + index * p.data_stride) >> 2;
+    vec3 v = vec3(uintBitsToFloat(in_data[w]), uintBitsToFloat(in_data[w + 1u]), uintBitsToFloat(in_data[w + 2u]));
+    if ((p.flags & RTR_BUILD_HAS_TRANSFORM) == 0u) return v;
+    uint t = p.transform_offset >> 2;
+    precise vec3 r;
+    for (uint k = 0u; k < 3u; k++) {
+        float m0 = uintBitsToFloat(in_transform[t + 4u * k]);
+        float m1 = uintBitsToFloat(in_transform[t + 4u * k + 1u]);
+        float m2 = uintBitsToFloat(in_transform[t + 4u * k + 2u]);
+        float m3 = uintBitsToFloat(in_transform[t + 4u * k + 3u]);
+        r[k] = ((m0 * v.x + m1 * v.y) + m2 * v.z) + m3;
+    }
+    return r;
+}
+
+void read_triangle(uint i, out vec3 v0, out vec3 v1, out vec3 v2) {
+    uint first = i * 3u; // the bindings start at the dispatch's first primitive
+    v0 = read_vertex(read_index(first));
+    v1 = read_vertex(read_index(first + 1u));
+    v2 = read_vertex(read_index(first + 2u));
+}
+
+// Inactive: any NaN. Without ALLOW_UPDATE also what two equal corners make a line:
+// it can never be hit, so it needs no slot.
+bool triangle_active(vec3 v0, vec3 v1, vec3 v2) {
+    if (any_nan(v0) || any_nan(v1) || any_nan(v2)) return false;
+    if ((p.flags & RTR_BUILD_KEEP_DEGENERATE) != 0u) return true;
+    return v0 != v1 && v1 != v2 && v0 != v2;
+}
+
+void read_aabb(uint i, out vec3 lo, out vec3 hi) {
+    uint w = (p.data_offset + i * p.data_stride) >> 2;
+    lo = vec3(uintBitsToFloat(in_data[w]), uintBitsToFloat(in_data[w + 1u]), uintBitsToFloat(in_data[w + 2u]));
+    hi = vec3(uintBitsToFloat(in_data[w + 3u]), uintBitsToFloat(in_data[w + 4u]), uintBitsToFloat(in_data[w + 5u]));
+}
