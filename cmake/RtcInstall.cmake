@@ -1,19 +1,23 @@
-# `cmake --install`: headers, the two libraries, programs; find_package(rtc) with components compiler and runtime
-# (targets rtc::compiler, rtc::runtime), and pkg-config files rtc-compiler and rtc-runtime.
+# `cmake --install`: headers, libraries, programs; find_package(rtc) with components compiler and runtime (targets
+# rtc::compiler, rtc::runtime, rtc::runtime_shared), and pkg-config files rtc-compiler and rtc-runtime.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
 set(RTC_PACKAGE_DIR ${CMAKE_INSTALL_LIBDIR}/cmake/rtc)
+set(RTC_INSTALLED "")
 
-# One library as a component: exported target, headers, pkg-config file.
-function(rtc_install_component component target description)
-  set_target_properties(${target} PROPERTIES EXPORT_NAME ${component})
-  target_include_directories(${target} INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
-  install(TARGETS ${target} EXPORT rtc-${component}
-    COMPONENT ${component}
-    ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
-    LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}
-    RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+# One component: its header, its libraries as exported targets, its pkg-config file (which names `library`).
+# The first target is rtc::<component>; others keep their own EXPORT_NAME.
+function(rtc_install_component component library description)
+  list(GET ARGN 0 first)
+  set_target_properties(${first} PROPERTIES EXPORT_NAME ${component})
+  foreach(target ${ARGN})
+    target_include_directories(${target} INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+    install(TARGETS ${target} EXPORT rtc-${component}
+      ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${component}
+      LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${component}
+      RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT ${component})
+  endforeach()
   install(EXPORT rtc-${component} NAMESPACE rtc:: FILE rtc-${component}-targets.cmake
     COMPONENT ${component} DESTINATION ${RTC_PACKAGE_DIR})
   install(FILES ${PROJECT_SOURCE_DIR}/include/rtc/${component}.h ${PROJECT_SOURCE_DIR}/include/rtc/abi.h
@@ -21,27 +25,19 @@ function(rtc_install_component component target description)
 
   set(PC_NAME rtc-${component})
   set(PC_DESCRIPTION "${description}")
-  get_target_property(PC_LIB ${target} OUTPUT_NAME)
-  if(NOT PC_LIB)
-    set(PC_LIB ${target})
-  endif()
-  get_target_property(type ${target} TYPE)
-  set(PC_CFLAGS "")
-  if(type STREQUAL "STATIC_LIBRARY" AND component STREQUAL "runtime")
-    set(PC_CFLAGS "-DRTR_STATIC")
-  endif()
+  set(PC_LIB ${library})
   configure_file(${PROJECT_SOURCE_DIR}/cmake/rtc.pc.in ${PROJECT_BINARY_DIR}/rtc-${component}.pc @ONLY)
   install(FILES ${PROJECT_BINARY_DIR}/rtc-${component}.pc
     COMPONENT ${component} DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 endfunction()
 
-set(RTC_INSTALLED "")
 if(TARGET rtcc)
-  rtc_install_component(compiler rtcc "Links ray tracing shaders into one Vulkan compute shader")
+  rtc_install_component(compiler rtcc "Links ray tracing shaders into one Vulkan compute shader" rtcc)
   list(APPEND RTC_INSTALLED compiler)
 endif()
 if(TARGET rtc_runtime)
-  rtc_install_component(runtime rtc_runtime "VK_NV_ray_tracing's host side on plain Vulkan compute")
+  rtc_install_component(runtime rtc_runtime "VK_NV_ray_tracing's host side on plain Vulkan compute"
+    rtc_runtime rtc_runtime_shared)
   list(APPEND RTC_INSTALLED runtime)
 endif()
 

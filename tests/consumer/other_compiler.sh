@@ -12,4 +12,4 @@ fi
 rm -rf "$3"
 "$4" -S "$2" -B "$3" -G Ninja "$how" -DCMAKE_BUILD_TYPE=Debug -DRTC_WARNINGS_AS_ERRORS=ON \
   -DRTC_BUILD_COMPILER=OFF -DRTC_BUILD_TOOLS=OFF -DRTC_BUILD_TESTS=OFF
-"$4" --build "$3" --target rtc_runtime
+"$4" --build "$3" --target rtc_runtime rtc_runtime_shared
