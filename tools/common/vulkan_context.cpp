@@ -117,30 +117,6 @@ int rank(const DeviceInfo& info) {
     }
 }
 
-const DeviceInfo& select(const std::vector<DeviceInfo>& devices, std::string wanted) {
-    if (devices.empty()) throw Error("no Vulkan device found");
-    if (wanted.empty()) {
-        const char* fromEnvironment = std::getenv("RTC_DEVICE");
-        if (fromEnvironment) wanted = fromEnvironment;
-    }
-    if (wanted.empty())
-        return *std::max_element(devices.begin(), devices.end(), [](const DeviceInfo& a, const DeviceInfo& b) {
-            return rank(a) < rank(b);
-        });
-    std::string list;
-    for (const DeviceInfo& info : devices)
-        list += "\n  " + std::to_string(info.index) + ": " + describe_device(info.properties, info.driver);
-    if (std::all_of(wanted.begin(), wanted.end(), [](unsigned char c) { return std::isdigit(c); })) {
-        const size_t index = wanted.size() < 6 ? size_t(std::stoul(wanted)) : devices.size();
-        if (index < devices.size()) return devices[index];
-        throw Error("no device " + wanted + "; there are:" + list);
-    }
-    for (const DeviceInfo& info : devices)
-        if (lower(describe_device(info.properties, info.driver)).find(lower(wanted)) != std::string::npos)
-            return info;
-    throw Error("no device is called '" + wanted + "'; there are:" + list);
-}
-
 std::vector<std::string> device_extensions(VkPhysicalDevice physical) {
     uint32_t count = 0;
     vkEnumerateDeviceExtensionProperties(physical, nullptr, &count, nullptr);
@@ -211,6 +187,30 @@ std::string describe_device(const VkPhysicalDeviceProperties& properties,
            std::to_string(VK_API_VERSION_MINOR(v)) + "." + std::to_string(VK_API_VERSION_PATCH(v));
 }
 
+const DeviceInfo& select_device(const std::vector<DeviceInfo>& devices, std::string wanted) {
+    if (devices.empty()) throw Error("no Vulkan device found");
+    if (wanted.empty()) {
+        const char* fromEnvironment = std::getenv("RTC_DEVICE");
+        if (fromEnvironment) wanted = fromEnvironment;
+    }
+    if (wanted.empty())
+        return *std::max_element(devices.begin(), devices.end(), [](const DeviceInfo& a, const DeviceInfo& b) {
+            return rank(a) < rank(b);
+        });
+    std::string list;
+    for (const DeviceInfo& info : devices)
+        list += "\n  " + std::to_string(info.index) + ": " + describe_device(info.properties, info.driver);
+    if (std::all_of(wanted.begin(), wanted.end(), [](unsigned char c) { return std::isdigit(c); })) {
+        const size_t index = wanted.size() < 6 ? size_t(std::stoul(wanted)) : devices.size();
+        if (index < devices.size()) return devices[index];
+        throw Error("no device " + wanted + "; there are:" + list);
+    }
+    for (const DeviceInfo& info : devices)
+        if (lower(describe_device(info.properties, info.driver)).find(lower(wanted)) != std::string::npos)
+            return info;
+    throw Error("no device is called '" + wanted + "'; there are:" + list);
+}
+
 DeviceList::DeviceList(bool validate) {
     instance = create_instance(validate, nullptr);
     devices = enumerate(instance);
@@ -237,7 +237,7 @@ Context::Context(const ContextOptions& options) : validation_(std::make_unique<V
     }
 
     const std::vector<DeviceInfo> devices = enumerate(instance);
-    const DeviceInfo& chosen = select(devices, options.device);
+    const DeviceInfo& chosen = select_device(devices, options.device);
     physical = chosen.physical;
     properties = chosen.properties;
     driver = chosen.driver;

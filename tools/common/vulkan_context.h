@@ -92,6 +92,10 @@ class DeviceList {
     std::vector<DeviceInfo> devices;
 };
 
+// The device an option names: an index, or a part of describe_device() in any case. Empty: RTC_DEVICE,
+// else the best kind. Throws Error listing what there is.
+const DeviceInfo& select_device(const std::vector<DeviceInfo>& devices, std::string wanted);
+
 // "NAME (DRIVER INFO), Vulkan x.y.z"
 std::string describe_device(const VkPhysicalDeviceProperties& properties,
                             const VkPhysicalDeviceDriverProperties& driver);
