@@ -95,6 +95,16 @@ rtcc_stage rtcc_stage_from_file_name(const char* file) {
     return kind ? rtcc::stage_of(*kind) : RTCC_STAGE_AUTO;
 }
 
+rtcc_stage rtcc_stage_from_source(const char* file, const char* source, size_t source_size) {
+    if (!source && source_size) return RTCC_STAGE_AUTO;
+    try {
+        const auto kind = rtc::stage_kind_from_source(file ? file : "", std::string(source ? source : "", source_size));
+        return kind ? rtcc::stage_of(*kind) : RTCC_STAGE_AUTO;
+    } catch (...) {
+        return RTCC_STAGE_AUTO;
+    }
+}
+
 rtcc_stage rtcc_stage_from_name(const char* name) {
     const auto kind = name ? rtc::stage_kind_from_name(name) : std::nullopt;
     return kind ? rtcc::stage_of(*kind) : RTCC_STAGE_AUTO;

@@ -66,6 +66,8 @@ FrontendResult preprocess_glsl(const GlslSource& source, const FrontendOptions& 
 // "rgen" … "rcall"; accepts the long spellings of #pragma shader_stage as well.
 std::optional<StageKind> stage_kind_from_name(std::string_view name);
 std::optional<StageKind> stage_kind_from_file(std::string_view file);
+// What a GlslSource without a kind is taken for; absent when that is an error.
+std::optional<StageKind> stage_kind_from_source(const std::string& file, const std::string& text);
 // Splits "460core"; false when it is no GLSL version and profile.
 bool parse_glsl_version(std::string_view text, int& version, std::string& profile);
 std::string glslang_version();

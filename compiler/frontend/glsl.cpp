@@ -269,6 +269,13 @@ std::optional<StageKind> stage_kind_from_file(std::string_view file) {
     return std::nullopt;
 }
 
+std::optional<StageKind> stage_kind_from_source(const std::string& file, const std::string& text) {
+    FrontendResult ignored;
+    StageKind kind;
+    if (!find_stage({std::nullopt, file, {}}, scan_source(text), kind, ignored)) return std::nullopt;
+    return kind;
+}
+
 bool parse_glsl_version(std::string_view text, int& version, std::string& profile) {
     const auto parsed = std::from_chars(text.data(), text.data() + text.size(), version);
     if (parsed.ec != std::errc()) return false;

@@ -264,6 +264,9 @@ RTCC_EXPORT rtcc_result_t rtcc_module_from_bytes(const char* file, const void* b
 RTCC_EXPORT rtcc_stage rtcc_module_stage(const uint32_t* words, size_t word_count, const char* entry);
 /* What RTCC_STAGE_AUTO takes from a file name; RTCC_STAGE_AUTO when it tells nothing. */
 RTCC_EXPORT rtcc_stage rtcc_stage_from_file_name(const char* file);
+/* What RTCC_STAGE_AUTO finds for a GLSL source; RTCC_STAGE_AUTO when compiling it would be
+ * RTCC_STATUS_INVALID_STAGE. */
+RTCC_EXPORT rtcc_stage rtcc_stage_from_source(const char* file, const char* source, size_t source_size);
 /* "rgen" or "raygen" and so on; RTCC_STAGE_AUTO for anything else. */
 RTCC_EXPORT rtcc_stage rtcc_stage_from_name(const char* name);
 /* "rgen", "rint", "rahit", "rchit", "rmiss", "rcall"; "auto" for anything else. */
