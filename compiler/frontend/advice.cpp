@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cctype>
-#include <map>
 #include <string_view>
 
 #include "frontend/frontend.h"
@@ -78,7 +77,7 @@ std::string_view code_before(const std::vector<std::string>& code, uint32_t line
 }
 
 std::string advice_for(const Diagnostic& message, std::string_view line_text,
-                       const std::vector<std::string>& code, bool has_version, bool has_extension) {
+                       const std::vector<std::string>& code, bool has_extension) {
     const std::string_view text = message.text;
     const std::string token = quoted_token(text);
     if (contains(text, "extension not supported: GL_EXT_ray_tracing_position_fetch") ||
@@ -94,8 +93,6 @@ std::string advice_for(const Diagnostic& message, std::string_view line_text,
         if (token == spelling.old_name || (token.empty() && contains(text, "syntax error") &&
                                            has_word(line_text, spelling.old_name)))
             return std::string(spelling.advice);
-    if (contains(text, "require non-es profile with version 460") || contains(text, "#version: statement must"))
-        return has_version ? std::string() : "begin the shader with #version 460";
     if (contains(text, "can only be used in uniform variables") || contains(text, "requires uniform or buffer storage"))
         return "write `uniform` before the type";
     if (contains(text, "without a format layout qualifier"))
@@ -131,7 +128,7 @@ void add_advice(const std::string& file, const std::string& source, std::vector<
         if (message.severity != Severity::Error) continue;
         const bool here = message.file == file && message.line >= 1 && message.line <= code.size();
         const std::string advice = advice_for(message, here ? std::string_view(code[message.line - 1]) : "", code,
-                                              facts.has_version, facts.names_nv || facts.names_ext);
+                                              facts.names_nv || facts.names_ext);
         if (contains(message.text, "GL_EXT_ray_tracing_position_fetch")) message.id = "position-fetch-glsl";
         if (!advice.empty()) message.text += "; " + advice;
     }

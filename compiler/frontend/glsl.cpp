@@ -60,23 +60,39 @@ const TBuiltInResource& limits() {
 }
 
 struct Version {
-    int number = 110;
-    EProfile profile = ENoProfile;
+    int number = 460;
+    EProfile profile = ECoreProfile;
     bool forced = false;
 };
 
-bool chosen_version(const FrontendOptions& options, const std::string& file, Version& version,
-                    FrontendResult& result) {
-    if (options.glsl_version.empty()) return true;
-    std::string profile;
-    if (!parse_glsl_version(options.glsl_version, version.number, profile)) {
-        report(result, "std-unknown", file, 0, "invalid GLSL version '" + options.glsl_version + "'");
+// glslang wants 460 for ray tracing and, given less, may fail in its own built-ins
+// (and print them); so versions are judged here, and a wrong one is parsed as 460
+// for the sake of the messages that follow.
+bool chosen_version(const GlslSource& source, const SourceFacts& facts, const FrontendOptions& options,
+                    Version& version, FrontendResult& result) {
+    int number = facts.version;
+    std::string profile = facts.profile;
+    uint32_t line = facts.version_line;
+    if (!options.glsl_version.empty()) {
+        if (!parse_glsl_version(options.glsl_version, number, profile)) {
+            report(result, "std-unknown", source.file, 0, "invalid GLSL version '" + options.glsl_version + "'");
+            return false;
+        }
+        version.forced = true;
+        line = 0;
+    }
+    if (number == 0) {
+        report(result, "version-missing", source.file, 1,
+               "no #version; begin the shader with #version 460");
         return false;
     }
-    version.forced = true;
-    version.profile = profile == "core" ? ECoreProfile
-                      : profile == "compatibility" ? ECompatibilityProfile
-                      : profile == "es" ? EEsProfile : ENoProfile;
+    if (number < 460 || (!profile.empty() && profile != "core")) {
+        report(result, "version-unsupported", source.file, line,
+               "#version " + std::to_string(number) + (profile.empty() ? "" : " " + profile) +
+                   ": ray tracing shaders need #version 460 (core profile)");
+        version.forced = true;
+        return false;
+    }
     return true;
 }
 
@@ -116,11 +132,11 @@ struct Attempt {
     bool wants_ext = false;  // an include, or glslang, says that this needs the EXT environment
 };
 
-bool preprocess(const GlslSource& source, const FrontendOptions& options, StageKind kind,
+bool preprocess(const GlslSource& source, const SourceFacts& facts, const FrontendOptions& options, StageKind kind,
                 Environment environment, FrontendResult& result, bool& wants_ext) {
     initialize_glslang();
     Version version;
-    if (!chosen_version(options, source.file, version, result)) return false;
+    chosen_version(source, facts, options, version, result);
     const EShLanguage stage = glslang_stage(kind);
     ShaderText text(source, options);
     SourceIncluder includer(options);
@@ -136,14 +152,14 @@ bool preprocess(const GlslSource& source, const FrontendOptions& options, StageK
     return ok && !has_errors(result.diagnostics);
 }
 
-Attempt compile(const GlslSource& source, const FrontendOptions& options, StageKind kind,
+Attempt compile(const GlslSource& source, const SourceFacts& facts, const FrontendOptions& options, StageKind kind,
                 Environment environment) {
     initialize_glslang();
     Attempt attempt;
     FrontendResult& result = attempt.result;
     result.kind = kind;
     Version version;
-    if (!chosen_version(options, source.file, version, result)) return attempt;
+    const bool version_ok = chosen_version(source, facts, options, version, result);
 
     const EShLanguage stage = glslang_stage(kind);
     ShaderText text(source, options);
@@ -166,7 +182,7 @@ Attempt compile(const GlslSource& source, const FrontendOptions& options, StageK
         linked = program.link(messages);
         parse_glslang_log(program.getInfoLog(), source.file, result.diagnostics);
     }
-    if (!parsed || !linked) {
+    if (!parsed || !linked || !version_ok) {
         for (const Diagnostic& message : result.diagnostics)
             attempt.wants_ext |= message.text.find("not supported for current targeted SPIR-V") != std::string::npos;
         add_advice(source.file, source.text, result.diagnostics);
@@ -228,7 +244,7 @@ Environment find_environment(const GlslSource& source, const FrontendOptions& op
     if (!facts.names_nv) return Environment::Ext;
     FrontendResult preprocessed;
     bool ignored = false;
-    if (!preprocess(source, options, kind, Environment::Ext, preprocessed, ignored)) return Environment::Ext;
+    if (!preprocess(source, facts, options, kind, Environment::Ext, preprocessed, ignored)) return Environment::Ext;
     return scan_source(preprocessed.text).names_ext ? Environment::Ext : Environment::Nv;
 }
 
@@ -301,12 +317,12 @@ FrontendResult compile_glsl(const GlslSource& source, const FrontendOptions& opt
         return result;
     }
     const Environment environment = find_environment(source, options, kind, facts);
-    Attempt attempt = compile(source, options, kind, environment);
+    Attempt attempt = compile(source, facts, options, kind, environment);
     if (environment == Environment::Nv && !facts.names_nv && attempt.wants_ext)
-        attempt = compile(source, options, kind, Environment::Ext);
+        attempt = compile(source, facts, options, kind, Environment::Ext);
     else if (environment == Environment::Nv && !attempt.result.ok && attempt.wants_ext) {
         // An NV shader with a feature of later SPIR-V: the newer environment parses NV too.
-        Attempt second = compile(source, options, kind, Environment::Ext);
+        Attempt second = compile(source, facts, options, kind, Environment::Ext);
         if (second.result.ok) attempt = std::move(second);
     }
     return std::move(attempt.result);
@@ -322,10 +338,10 @@ FrontendResult preprocess_glsl(const GlslSource& source, const FrontendOptions& 
     }
     bool wants_ext = false;
     const bool ext = facts.names_ext;
-    result.ok = preprocess(source, options, kind, ext ? Environment::Ext : Environment::Nv, result, wants_ext);
+    result.ok = preprocess(source, facts, options, kind, ext ? Environment::Ext : Environment::Nv, result, wants_ext);
     if (!ext && wants_ext) {
         result = {};
-        result.ok = preprocess(source, options, kind, Environment::Ext, result, wants_ext);
+        result.ok = preprocess(source, facts, options, kind, Environment::Ext, result, wants_ext);
     }
     result.kind = kind;
     drop_preamble(result.text);

@@ -45,11 +45,14 @@ bool is_summary(std::string_view text) {
 // says about swizzles, assignments and duplicates on that line helps nobody.
 bool is_consequence(const Diagnostic& message, const std::vector<Diagnostic>& earlier) {
     for (const Diagnostic& other : earlier) {
-        if (other.file != message.file || other.line != message.line || message.line == 0) continue;
-        if (other.text == message.text) return true;
+        if (other.file != message.file || message.line == 0) continue;
         const bool unknown = contains(other.text, "undeclared identifier") ||
                              contains(other.text, "maybe an instance name is needed");
-        if (unknown && (contains(message.text, "swizzle") || starts_with(message.text, "'assign'") ||
+        // The float stays for the rest of the file.
+        if (unknown && contains(message.text, "swizzle")) return true;
+        if (other.line != message.line) continue;
+        if (other.text == message.text) return true;
+        if (unknown && (starts_with(message.text, "'assign'") ||
                         (starts_with(message.text, other.text.substr(0, other.text.find(" :"))) &&
                          contains(message.text, "undeclared identifier"))))
             return true;
@@ -102,6 +105,8 @@ void parse_glslang_log(std::string_view log, const std::string& file, std::vecto
             message.text = std::string(line);
         }
         if (message.file.empty()) message.file = file;
+        const size_t doubled = message.text.find(" :  ");
+        if (doubled != std::string::npos) message.text.erase(doubled + 2, 1);
         if (!is_consequence(message, out)) out.push_back(std::move(message));
     }
     // "Missing entry point" after a syntax error is only its echo.

@@ -1,6 +1,7 @@
 #include "frontend/scan.h"
 
 #include <cctype>
+#include <charconv>
 
 namespace rtc {
 
@@ -78,7 +79,10 @@ void scan_directive(std::string_view line, uint32_t number, SourceFacts& facts) 
     if (words.next() != "#") return;
     const std::string_view directive = words.next();
     if (directive == "version") {
-        facts.has_version = true;
+        const std::string_view version = words.next();
+        std::from_chars(version.data(), version.data() + version.size(), facts.version);
+        facts.profile = std::string(words.next());
+        facts.version_line = number;
     } else if (directive == "extension") {
         const std::string_view name = words.next();
         if (name == "GL_NV_ray_tracing") facts.names_nv = true;

@@ -19,7 +19,9 @@ struct StagePragma {
 struct SourceFacts {
     bool names_nv = false;   // #extension GL_NV_ray_tracing
     bool names_ext = false;  // #extension GL_EXT_ray_tracing, or any extension built on it
-    bool has_version = false;
+    int version = 0;         // of #version; 0: there is none
+    std::string profile;     // "core", "compatibility", "es" or empty
+    uint32_t version_line = 0;
     std::vector<StagePragma> stage_pragmas;
 };
 

@@ -1,0 +1,141 @@
+// The continuation machine: the variables all states share, the functions the
+// traversal module gives, and the states themselves.
+//
+//   state = raygen; while (state != done) switch (state) { ... }
+//
+// A call (trace, callable, suspending report) ends a state: it puts the payload
+// into the shared words, pushes what is live, names the state to return to, and
+// sets `state` to the traversal or the callee. A callee ends with `state = return`.
+// See docs/architecture.md.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "ir/emitter.h"
+#include "lower/stage.h"
+
+namespace rtc::continuation {
+
+using ir::Block;
+using ir::Emitter;
+using ir::Function;
+using ir::Id;
+using ir::Inst;
+using ir::Op;
+using ir::Program;
+
+// State ids. Shader entries follow kFirstEntry in stage order, so that a handle
+// read from an SBT is checked with one comparison; resume states come after.
+constexpr uint32_t kStateDone = 0;
+constexpr uint32_t kStateTraverse = 1;
+constexpr uint32_t kFirstEntry = 2;
+
+// One `case` of the dispatcher.
+struct State {
+    uint32_t id = 0;
+    uint32_t stage = 0;
+    std::string name;           // "name", "name.1", ... for dumps
+    std::vector<Block> blocks;  // every path ends in a branch to Machine::dispatch
+};
+
+class Machine {
+  public:
+    Machine(Program& program, const LinkOptions& options);
+
+    Program& p;
+    const LinkOptions& options;
+
+    // ---- traversal exports, by the names of compiler/traversal ----
+    std::vector<Function> traversal_functions;
+    void import_traversal(const ir::Module& traversal, bool any_hit, bool aabbs, bool resumable);
+    Id function(const std::string& name) const;
+    Id variable(const std::string& name) const;
+    Id call(Emitter& e, const std::string& name, const std::vector<Id>& arguments = {}) const;
+    Id load(Emitter& e, const std::string& name) const;
+    void store(Emitter& e, const std::string& name, Id value) const;
+
+    // ---- variables of the machine's main function ----
+    Id new_variable(Id type, const std::string& name);  // Function storage; survives from state to state
+    Id u32_variable(const std::string& name) { return new_variable(p.uint_type(), name); }
+    Id state = 0;        // next state
+    Id ret = 0;          // return state of the current shader | frame words << 16
+    Id depth = 0;        // trace calls below the ray generation shader
+    Id push = 0, pop = 0;  // words the dispatcher moves before the next state
+    Id leave = 0;        // bool: an intact loop is being left for another state
+    Id fresh = 0;        // bool: the traversal state starts a new ray
+    Id report_return = 0;  // state of an intersection shader waiting for its any-hit, or 0
+    Id accepted = 0;     // uint: what that any-hit decided
+    Id record = 0;       // Private: first word of the record of the shader being entered
+    Id callable_depth = 0;
+    Id callable_ret = 0;  // as ret, for callables: they cannot trace, so the two never mix
+    Id payload_word(uint32_t i) { return word(payload_words_, i, "payload"); }
+    Id callable_word(uint32_t i) { return word(callable_words_, i, "callable"); }
+    Id frame_word(uint32_t i) { return word(frame_words_, i, "frame"); }
+    uint32_t payload_word_count() const { return static_cast<uint32_t>(payload_words_.size()); }
+    uint32_t callable_word_count() const { return static_cast<uint32_t>(callable_words_.size()); }
+    uint32_t frame_word_count() const { return static_cast<uint32_t>(frame_words_.size()); }
+    const std::vector<Inst>& variables() const { return variables_; }
+    std::vector<Inst>& variables() { return variables_; }
+
+    // Label every state branches to when it is done: the dispatch loop's continue target.
+    Id dispatch = 0;
+
+    // ---- states ----
+    std::vector<State> states;
+    uint32_t next_state_id = kFirstEntry;
+    uint32_t entry_count = 0;
+    uint32_t entry_state(uint32_t stage) const { return kFirstEntry + stage; }
+
+    // ---- facts the passes collect ----
+    bool has_stack = false;
+    uint32_t max_frame_words = 0;
+    uint32_t max_depth = 1;
+    uint32_t max_callable_depth = 0;
+    bool any_hit = false, aabbs = false, traces = false, callables = false;
+    std::vector<TraceSiteReport> sites;
+
+    // `state = id` and back to the dispatcher.
+    void go(Emitter& e, uint32_t id);
+    void go_value(Emitter& e, Id value);
+    // Return to the caller of the current shader.
+    void go_return(Emitter& e) { go_to_saved(e, ret); }
+    void go_callable_return(Emitter& e) { go_to_saved(e, callable_ret); }
+
+    // uint f(uint record index, uint which): entry state of a record's shader, 0 for none or
+    // (reported) a word that is no state of this module. `which`: 0 general or closest-hit,
+    // 1 any-hit, 2 intersection. Sets `record`. region: "miss", "hit" or "callable".
+    Id entry_function(const std::string& region);
+    Id call_entry(Emitter& e, const std::string& region, Id index, uint32_t which);
+
+    // ---- assembling (continuation/dispatch.cpp) ----
+    // The entry point: launch, dispatch loop, states. Call when all stages are split.
+    Function build_main();
+    std::vector<Function> helper_functions;
+
+    // Reserved resources by RTC_BINDING_*, set by import_traversal.
+    std::map<uint32_t, Id> reserved;
+    uint32_t stack_words = 0;
+    uint32_t scratch_words = 0;  // per lane, when lanes can suspend
+
+  private:
+    Id word(std::vector<Id>& words, uint32_t i, const char* name);
+    void go_to_saved(Emitter& e, Id saved);
+    std::map<std::string, Id> entry_functions_;
+
+    std::vector<Inst> variables_;
+    std::vector<Id> payload_words_, callable_words_, frame_words_;
+    std::map<std::string, Id> exports_;
+    std::map<std::string, Id> export_types_;  // function result type, or variable pointee
+};
+
+// split.cpp: cuts a stage in memory form into states at its calls and adds them to the machine.
+void split_stage(Program& program, lower::Stage& stage, const lower::CallKinds& kinds, Machine& machine);
+
+// liveness.cpp: for each call block of a body in memory form (by label), the variables whose
+// value is needed after the call. `candidates` are the variables looked at, in order.
+std::map<Id, std::vector<Id>> live_across_calls(const lower::Stage& stage,
+                                                const lower::CallKinds& kinds, const std::vector<Id>& candidates);
+
+}  // namespace rtc::continuation

@@ -1,0 +1,256 @@
+// The instruction grammar and the small services of ir/module.h.
+#include "ir/module.h"
+
+#include <algorithm>
+#include <cstring>
+
+namespace rtc {
+
+const char* stage_kind_name(StageKind kind) {
+    switch (kind) {
+        case StageKind::RayGen: return "rgen";
+        case StageKind::Intersection: return "rint";
+        case StageKind::AnyHit: return "rahit";
+        case StageKind::ClosestHit: return "rchit";
+        case StageKind::Miss: return "rmiss";
+        case StageKind::Callable: return "rcall";
+    }
+    return "?";
+}
+
+namespace ir {
+namespace {
+
+struct Row {
+    uint16_t value;
+    OpInfo info;
+};
+
+const Row kRows[] = {
+#define RTC_OP(value, name, has_type, has_result, pattern) {value, {name, has_type != 0, has_result != 0, pattern}},
+#include "ir/grammar.inc"
+#undef RTC_OP
+};
+
+constexpr uint32_t kMaskParameters_MemoryAccess_Id = 0x8 | 0x10 | 0x10000 | 0x20000;
+constexpr uint32_t kMemoryAligned = 0x2;
+constexpr uint32_t kImageGrad = 0x4;
+constexpr uint32_t kImageFlagsWithoutOperand = 0x400 | 0x800 | 0x1000 | 0x2000 | 0x4000;
+
+// Visits every id word of `words` under `pattern`; stops quietly at the end of the words.
+template <typename Words, typename Fn>
+void visit_ids(Op op, const char* pattern, Words& words, uint32_t switch_words, const Fn& fn) {
+    size_t i = 0;
+    const size_t n = words.size();
+    for (const char* p = pattern; *p && i < n; ++p) {
+        const char kind = *p;
+        const bool star = p[1] == '*';
+        if (p[1] == '*' || p[1] == '?') ++p;
+        do {
+            switch (kind) {
+                case 'r': fn(words[i++]); break;
+                case 'l':
+                case 'x':
+                case 'b': ++i; break;
+                case 'S': {
+                    const Op inner = static_cast<Op>(words[i++]);
+                    // The embedded instruction's own operands follow.
+                    const OpInfo* info = op_info(inner);
+                    const char* q = info ? info->pattern : "r*";
+                    for (; *q && i < n; ++q) {
+                        const char inner_kind = *q;
+                        const bool inner_star = q[1] == '*';
+                        if (q[1] == '*' || q[1] == '?') ++q;
+                        do {
+                            if (inner_kind == 'r') fn(words[i]);
+                            ++i;
+                        } while (inner_star && i < n);
+                    }
+                    break;
+                }
+                case 's': {
+                    while (i < n) {
+                        const uint32_t word = words[i++];
+                        if (!(word & 0xff000000u) || !(word & 0x00ff0000u) || !(word & 0x0000ff00u) || !(word & 0xffu))
+                            break;
+                    }
+                    break;
+                }
+                case 'c': i = n; break;
+                case 'p':
+                    i += switch_words;
+                    if (i < n) fn(words[i++]);
+                    break;
+                case 'q':
+                    fn(words[i++]);
+                    ++i;
+                    break;
+                case 'R':
+                    fn(words[i++]);
+                    if (i < n) fn(words[i++]);
+                    break;
+                case 'm': {
+                    const uint32_t mask = words[i++];
+                    for (uint32_t bit = 1; bit && i < n; bit <<= 1) {
+                        if (!(mask & bit)) continue;
+                        if (bit == kMemoryAligned)
+                            ++i;
+                        else if (bit & kMaskParameters_MemoryAccess_Id)
+                            fn(words[i++]);
+                    }
+                    break;
+                }
+                case 'i': {
+                    const uint32_t mask = words[i++];
+                    for (uint32_t bit = 1; bit && i < n; bit <<= 1) {
+                        if (!(mask & bit) || (bit & kImageFlagsWithoutOperand)) continue;
+                        fn(words[i++]);
+                        if (bit == kImageGrad && i < n) fn(words[i++]);
+                    }
+                    break;
+                }
+                case 'o': i = n; break;
+                case 'd':
+                    ++i;
+                    if (op == Op::OpDecorateId)
+                        while (i < n) fn(words[i++]);
+                    i = n;
+                    break;
+                case 'e':
+                    ++i;
+                    if (op == Op::OpExecutionModeId)
+                        while (i < n) fn(words[i++]);
+                    i = n;
+                    break;
+                default: ++i; break;
+            }
+        } while (star && i < n);
+    }
+}
+
+}  // namespace
+
+const OpInfo* op_info(Op op) {
+    const uint16_t value = static_cast<uint16_t>(op);
+    const Row* end = kRows + std::size(kRows);
+    const Row* row = std::lower_bound(kRows, end, value, [](const Row& r, uint16_t v) { return r.value < v; });
+    return row != end && row->value == value ? &row->info : nullptr;
+}
+
+bool Inst::is_terminator() const {
+    switch (op) {
+        case Op::OpBranch:
+        case Op::OpBranchConditional:
+        case Op::OpSwitch:
+        case Op::OpReturn:
+        case Op::OpReturnValue:
+        case Op::OpKill:
+        case Op::OpTerminateInvocation:
+        case Op::OpUnreachable:
+        case Op::OpIgnoreIntersectionKHR:
+        case Op::OpTerminateRayKHR: return true;
+        default: return false;
+    }
+}
+
+void Inst::for_each_id(const std::function<void(Id&)>& fn) {
+    if (const OpInfo* info = op_info(op)) visit_ids(op, info->pattern, ops, switch_words, fn);
+}
+
+void Inst::for_each_id(const std::function<void(Id)>& fn) const {
+    if (const OpInfo* info = op_info(op)) visit_ids(op, info->pattern, ops, switch_words, fn);
+}
+
+const Inst* Block::merge() const {
+    if (insts.size() < 2) return nullptr;
+    const Inst& inst = insts[insts.size() - 2];
+    return inst.is_merge() ? &inst : nullptr;
+}
+
+std::vector<Id> Block::successors() const {
+    std::vector<Id> out;
+    if (insts.empty()) return out;
+    const Inst& last = insts.back();
+    switch (last.op) {
+        case Op::OpBranch: out.push_back(last.ops[0]); break;
+        case Op::OpBranchConditional:
+            out.push_back(last.ops[1]);
+            out.push_back(last.ops[2]);
+            break;
+        case Op::OpSwitch:
+            out.push_back(last.ops[1]);
+            for (size_t i = 2 + last.switch_words; i < last.ops.size(); i += last.switch_words + 1)
+                out.push_back(last.ops[i]);
+            break;
+        default: break;
+    }
+    return out;
+}
+
+Block* Function::find_block(Id label) {
+    for (Block& block : blocks)
+        if (block.label == label) return &block;
+    return nullptr;
+}
+
+Function* Module::find_function(Id id) {
+    for (Function& function : functions)
+        if (function.id() == id) return &function;
+    return nullptr;
+}
+
+bool Module::has_capability(spv::Capability capability) const {
+    return std::find(capabilities.begin(), capabilities.end(), capability) != capabilities.end();
+}
+
+void Module::add_capability(spv::Capability capability) {
+    if (!has_capability(capability)) capabilities.push_back(capability);
+}
+
+void Module::add_extension(const std::string& name) {
+    if (std::find(extensions.begin(), extensions.end(), name) == extensions.end()) extensions.push_back(name);
+}
+
+std::string Module::name_of(Id id) const {
+    for (const Inst& inst : names)
+        if (inst.op == Op::OpName && inst.ops[0] == id)
+            return words_string(inst.ops.data() + 1, inst.ops.size() - 1);
+    return {};
+}
+
+void Module::set_name(Id id, const std::string& name) {
+    Inst inst(Op::OpName, 0, 0, {id});
+    const std::vector<uint32_t> words = string_words(name);
+    inst.ops.insert(inst.ops.end(), words.begin(), words.end());
+    names.push_back(std::move(inst));
+}
+
+std::vector<uint32_t> string_words(const std::string& text) {
+    std::vector<uint32_t> words(text.size() / 4 + 1, 0);
+    for (size_t i = 0; i < text.size(); ++i)
+        words[i / 4] |= static_cast<uint32_t>(static_cast<unsigned char>(text[i])) << (8 * (i % 4));
+    return words;
+}
+
+std::string words_string(const uint32_t* words, size_t count, size_t* used) {
+    std::string text;
+    for (size_t i = 0; i < count; ++i) {
+        for (int shift = 0; shift < 32; shift += 8) {
+            const char c = static_cast<char>(words[i] >> shift & 0xff);
+            if (!c) {
+                if (used) *used = i + 1;
+                return text;
+            }
+            text += c;
+        }
+    }
+    if (used) *used = count;
+    return text;
+}
+
+void fail(const std::string& id, const std::string& file, uint32_t line, const std::string& text) {
+    throw CompileError(Diagnostic{Severity::Error, id, file, line, text});
+}
+
+}  // namespace ir
+}  // namespace rtc

@@ -1,0 +1,94 @@
+// The module under construction: interned types and constants, and the import
+// of other modules (stages, traversal) into its id space.
+#pragma once
+
+#include <map>
+#include <set>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "ir/module.h"
+
+namespace rtc::ir {
+
+// A 32-bit-word view of one scalar inside a value.
+struct Leaf {
+    std::vector<uint32_t> path;  // composite indices
+    Id type = 0;                 // scalar type
+    uint32_t words = 1;          // 1, or 2 for 64-bit scalars
+};
+
+class Program {
+  public:
+    Module module;
+
+    // ---- types and constants; equal requests give equal ids ----
+    Id void_type();
+    Id bool_type();
+    Id int_type(uint32_t width, bool is_signed);
+    Id float_type(uint32_t width);
+    Id uint_type() { return int_type(32, false); }
+    Id vector_type(Id element, uint32_t count);
+    Id pointer_type(spv::StorageClass storage, Id pointee);
+    Id function_type(Id result, const std::vector<Id>& params);
+    Id array_type(Id element, uint32_t count);
+    Id constant_u32(uint32_t value);
+    Id constant_scalar(Id type, uint64_t bits);  // int or float of any width
+    Id constant_bool(bool value);
+    Id constant_null(Id type);
+    Id undef(Id type);
+
+    // ---- looking things up ----
+    const Inst* def(Id id) const;  // global instruction defining id, or nullptr
+    Op type_op(Id type) const;     // OpNop when unknown
+    Id pointee(Id pointer_type) const;
+    spv::StorageClass storage(Id pointer_type) const;
+    // Value of an integer constant (not specialisable); false otherwise.
+    bool constant_value(Id id, uint64_t& value) const;
+    // Type of member/element `index` of a composite type.
+    Id element_type(Id type, uint32_t index) const;
+    uint32_t element_count(Id type) const;  // vector, matrix, array of constant length, struct
+    bool is_pointer(Id type) const { return type_op(type) == Op::OpTypePointer; }
+    bool is_opaque(Id type) const;  // image, sampler, sampled image, AS, or an aggregate of them
+
+    // Scalars of a type in order; throws with `what` in the message for types without a word form.
+    void flatten(Id type, std::vector<Leaf>& leaves, const std::string& what) const;
+    uint32_t word_count(Id type, const std::string& what) const;
+
+    // ---- globals ----
+    Id add_global(Inst inst);  // gives inst.result a fresh id when it is 0
+    Id add_variable(spv::StorageClass storage, Id pointee, const std::string& name);
+    void decorate(Id target, spv::Decoration decoration, std::vector<uint32_t> operands = {});
+    std::vector<const Inst*> decorations_of(Id id) const;
+    bool decoration(Id id, spv::Decoration decoration, uint32_t* operand = nullptr) const;
+    bool member_decoration(Id id, uint32_t member, spv::Decoration decoration, uint32_t* operand = nullptr) const;
+    void remove_decorations(Id id, spv::Decoration decoration);
+
+    // Source file index in module.files for `name`.
+    uint32_t file_index(const std::string& name);
+
+    // ---- import ----
+    // Adds `source`'s types, constants, globals, decorations and names, and returns its functions
+    // with every id mapped. `map` receives source id -> program id.
+    std::vector<Function> import(const Module& source, std::unordered_map<Id, Id>& map);
+
+    // Types of lowered acceleration structures: the header block, and arrays of it by original array type.
+    Id header_struct = 0;
+    std::map<Id, Id> header_arrays;
+
+    // Rebuilds lookup tables after passes edited module.globals or module.decorations directly.
+    void reindex();
+
+  private:
+    Id intern(Inst inst, const std::string& extra_key = {});
+    static std::string key_of(const Inst& inst, const std::string& extra);
+
+    std::unordered_map<std::string, Id> interned_;
+    std::unordered_map<Id, size_t> global_index_;
+    std::unordered_map<Id, std::vector<size_t>> decoration_index_;
+    std::map<std::string, uint32_t> file_index_;
+    std::map<std::string, Id> ext_sets_;
+};
+
+}  // namespace rtc::ir

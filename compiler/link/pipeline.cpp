@@ -1,0 +1,318 @@
+// The journey of a pipeline: every step of link_pipeline, in order, and why that order.
+#include <algorithm>
+#include <set>
+
+#include "continuation/machine.h"
+#include "link/link.h"
+#include "lower/stage.h"
+#include "rtc/abi.h"
+#include "traversal/traversal_modules.h"
+
+namespace rtc {
+namespace {
+
+using continuation::Machine;
+using ir::Id;
+using ir::Inst;
+using ir::Op;
+using ir::Program;
+
+spv::ExecutionModel execution_model(StageKind kind) {
+    switch (kind) {
+        case StageKind::RayGen: return spv::ExecutionModel::RayGenerationKHR;
+        case StageKind::Intersection: return spv::ExecutionModel::IntersectionKHR;
+        case StageKind::AnyHit: return spv::ExecutionModel::AnyHitKHR;
+        case StageKind::ClosestHit: return spv::ExecutionModel::ClosestHitKHR;
+        case StageKind::Miss: return spv::ExecutionModel::MissKHR;
+        case StageKind::Callable: return spv::ExecutionModel::CallableKHR;
+    }
+    return spv::ExecutionModel::Max;
+}
+
+class Linker {
+  public:
+    Linker(const PipelineInput& input, const LinkOptions& options, LinkResult& result)
+        : input_(input), options_(options), result_(result), machine_(program_, options) {}
+
+    void run() {
+        check_input();
+        machine_.entry_count = static_cast<uint32_t>(input_.stages.size());
+        machine_.next_state_id = continuation::kFirstEntry + machine_.entry_count;
+        set_depths();
+        import_traversal();
+        std::map<uint32_t, uint32_t> spec_ids;
+        for (size_t i = 0; i < input_.stages.size(); ++i) add_stage(static_cast<uint32_t>(i), spec_ids);
+        if (options_.stop_after == "split") {
+            dump_states();
+            return;
+        }
+        assemble();
+        finish();
+    }
+
+  private:
+    void check_input() {
+        if (input_.stages.empty()) ir::fail("pipeline-empty", "", 0, "a pipeline needs at least one stage");
+        if (input_.stages.size() > 4000)
+            ir::fail("pipeline-too-large", "", 0, "a pipeline of more than 4000 stages is not supported");
+        if (options_.max_recursion_depth > 31)
+            ir::fail("recursion-limit", "", 0, "the recursion depth is at most 31");
+        bool raygen = false;
+        for (const StageInput& stage : input_.stages) raygen |= stage.kind == StageKind::RayGen;
+        if (!raygen) ir::fail("pipeline-without-raygen", "", 0, "a pipeline needs a ray generation stage");
+        for (const GroupInput& group : input_.groups) {
+            auto check = [&](int index, std::initializer_list<StageKind> kinds, const char* what) {
+                if (index < 0) return;
+                if (index >= static_cast<int>(input_.stages.size()))
+                    ir::fail("group-stage", "", 0,
+                             "group '" + group.name + "' names stage " + std::to_string(index) + ", there are " +
+                                 std::to_string(input_.stages.size()));
+                for (StageKind kind : kinds)
+                    if (input_.stages[index].kind == kind) return;
+                ir::fail("group-stage", "", 0,
+                         "group '" + group.name + "' uses " + stage_kind_name(input_.stages[index].kind) +
+                             " stage '" + input_.stages[index].name + "' as " + what);
+            };
+            check(group.general, {StageKind::RayGen, StageKind::Miss, StageKind::Callable}, "a general shader");
+            check(group.closest_hit, {StageKind::ClosestHit}, "a closest-hit shader");
+            check(group.any_hit, {StageKind::AnyHit}, "an any-hit shader");
+            check(group.intersection, {StageKind::Intersection}, "an intersection shader");
+            if (group.kind == GroupKind::Procedural && group.intersection < 0 &&
+                (group.closest_hit >= 0 || group.any_hit >= 0))
+                ir::fail("group-without-intersection", "", 0,
+                         "procedural hit group '" + group.name + "' has no intersection shader");
+            if (group.kind == GroupKind::Triangles && group.intersection >= 0)
+                ir::fail("group-intersection", "", 0,
+                         "triangle hit group '" + group.name + "' has an intersection shader");
+        }
+    }
+
+    bool has(StageKind kind) const {
+        return std::any_of(input_.stages.begin(), input_.stages.end(),
+                           [&](const StageInput& stage) { return stage.kind == kind; });
+    }
+
+    void set_depths() {
+        machine_.max_depth = std::max(1u, options_.max_recursion_depth);
+        machine_.max_callable_depth = options_.max_callable_depth ? options_.max_callable_depth : 31;
+    }
+
+    void import_traversal() {
+        const TraversalModule* traversal = find_traversal_module("watertight");
+        const ir::Module module =
+            ir::read_module(std::vector<uint32_t>(traversal->words, traversal->words + traversal->count), "traversal");
+        // Reports always hand over to the machine: it ends the shader after an accepted first hit.
+        kinds_.report_suspends = true;
+        resumable_ = options_.resumable;
+        machine_.import_traversal(module, has(StageKind::AnyHit), has(StageKind::Intersection), resumable_);
+        program_.module.version = module.version;
+    }
+
+    void add_stage(uint32_t index, std::map<uint32_t, uint32_t>& spec_ids) {
+        const StageInput& stage_input = input_.stages[index];
+        ir::Module module = ir::read_module(stage_input.spirv, stage_input.file);
+        if (options_.validate) {
+            std::vector<uint32_t> words = ir::write_module(module, false);
+            const std::string problem = link::validate(words, 3, true);
+            if (!problem.empty())
+                ir::fail("spirv-invalid", stage_input.file, 0,
+                         "stage '" + stage_input.name + "' is not valid SPIR-V: " + problem);
+        }
+        const ir::EntryPoint* entry = nullptr;
+        for (const ir::EntryPoint& candidate : module.entry_points)
+            if (candidate.name == stage_input.entry && candidate.model == execution_model(stage_input.kind))
+                entry = &candidate;
+        if (!entry)
+            ir::fail("entry-point-missing", stage_input.file, 0,
+                     "no " + std::string(stage_kind_name(stage_input.kind)) + " entry point named '" +
+                         stage_input.entry + "'");
+        if (module.addressing == spv::AddressingModel::PhysicalStorageBuffer64)
+            program_.module.addressing = module.addressing;
+        if (module.memory_model == spv::MemoryModel::Vulkan) program_.module.memory_model = module.memory_model;
+        program_.module.version = std::max(program_.module.version, module.version);
+        const Id entry_function = entry->function;
+        // Other entry points and their modes are not part of this stage.
+        module.execution_modes.clear();
+        link::specialize(module, stage_input, spec_ids, result_.reflection.spec_constants);
+
+        std::unordered_map<Id, Id> map;
+        std::vector<ir::Function> functions = program_.import(module, map);
+
+        lower::Stage stage;
+        stage.kind = stage_input.kind;
+        stage.index = index;
+        stage.name = stage_input.name;
+        stage.file = stage_input.file;
+        lower::select_entry(program_, stage, std::move(functions), map.at(entry_function));
+        // NV's exits and locations first: nothing later may see code after an ignore.
+        lower::normalize_calls(program_, stage);
+        // Inlining before interface lowering: pointers to payloads and acceleration structures
+        // that were passed to functions become plain variables and chains.
+        lower::inline_calls(program_, stage, kinds_);
+        lower::lower_interface(program_, stage, machine_);
+        lower::lower_records(program_, stage, machine_);
+        link::unify_resources(program_, stage, resources_, result_.reflection);
+        // Last before the split: earlier passes may still move values between blocks.
+        lower::to_memory_form(program_, stage, kinds_);
+
+        StageReport report;
+        report.kind = stage.kind;
+        report.name = stage.name;
+        report.file = stage.file;
+        report.first_state = machine_.entry_state(index);
+        report.record_bytes = stage.record_bytes;
+        if (stage.incoming)
+            report.payload_words = program_.word_count(program_.pointee(program_.def(stage.incoming)->type), "payload");
+        const size_t before = machine_.states.size();
+        continuation::split_stage(program_, stage, kinds_, machine_);
+        report.states = static_cast<uint32_t>(machine_.states.size() - before);
+        result_.reflection.stages.push_back(std::move(report));
+        for (ir::Function& function : stage.functions) helpers_.push_back(std::move(function));
+    }
+
+    // The states as functions of their own, for golden tests: text before traversal is linked.
+    void dump_states() {
+        std::sort(machine_.states.begin(), machine_.states.end(),
+                  [](const continuation::State& a, const continuation::State& b) { return a.id < b.id; });
+        for (continuation::State& state : machine_.states)
+            program_.module.set_name(state.blocks.front().label, "state." + std::to_string(state.id) + "." + state.name);
+        ir::Module& m = program_.module;
+        ir::Function main;
+        main.def = Inst(Op::OpFunction, program_.void_type(), m.new_id(),
+                        {0, program_.function_type(program_.void_type(), {})});
+        m.set_name(main.id(), "states");
+        for (continuation::State& state : machine_.states)
+            for (ir::Block& block : state.blocks) main.blocks.push_back(std::move(block));
+        std::set<Id> used;
+        for (const ir::Block& block : main.blocks)
+            for (const Inst& inst : block.insts) inst.for_each_id([&](Id id) { used.insert(id); });
+        std::vector<Inst> variables;
+        for (const Inst& variable : machine_.variables())
+            if (used.count(variable.result)) variables.push_back(variable);
+        if (!main.blocks.empty())
+            main.blocks.front().insts.insert(main.blocks.front().insts.begin(), variables.begin(), variables.end());
+        const Id main_id = main.id();
+        for (ir::Function& function : helpers_) m.functions.push_back(std::move(function));
+        m.functions.push_back(std::move(main));
+        // Traversal functions are named but not shown.
+        link::tidy(program_, {main_id});
+        result_.dump = ir::to_text(ir::write_module(m, true));
+        result_.ok = true;
+    }
+
+    void assemble() {
+        ir::Function main = machine_.build_main();
+        main_ = main.id();
+        ir::Module& m = program_.module;
+        for (ir::Function& function : machine_.traversal_functions) m.functions.push_back(std::move(function));
+        for (ir::Function& function : machine_.helper_functions) m.functions.push_back(std::move(function));
+        for (ir::Function& function : helpers_) m.functions.push_back(std::move(function));
+        m.functions.push_back(std::move(main));
+    }
+
+    void finish() {
+        Reflection& r = result_.reflection;
+        link::place_reserved(program_, machine_, options_, r);
+        link::declare_entry(program_, main_, options_, r);
+        link::tidy(program_, {main_});
+        main_ = program_.module.entry_points[0].function;
+        // The interface after dead variables are gone.
+        std::set<Id> alive;
+        for (const Inst& inst : program_.module.globals) alive.insert(inst.result);
+        std::erase_if(program_.module.entry_points[0].interface, [&](Id id) { return !alive.count(id); });
+
+        r.flags = resumable_ ? RTC_MODULE_RESUMABLE : 0;
+        r.state_count = static_cast<uint32_t>(machine_.states.size());
+        r.max_recursion_depth = machine_.max_depth;
+        r.max_callable_depth = machine_.callables ? machine_.max_callable_depth : 0;
+        r.stack_words = machine_.stack_words;
+        r.payload_words = machine_.payload_word_count();
+        r.callable_words = machine_.callable_word_count();
+        r.scratch_words = machine_.scratch_words;
+        r.trace_sites = machine_.sites;
+        r.required_features = link::required_features(program_.module);
+        for (const Inst& inst : program_.module.globals) {
+            uint32_t set = 0, binding = 0;
+            if (inst.op != Op::OpVariable ||
+                !program_.decoration(inst.result, spv::Decoration::DescriptorSet, &set) || set != r.reserved_set)
+                continue;
+            program_.decoration(inst.result, spv::Decoration::Binding, &binding);
+            if (binding >= r.reserved_binding && binding < r.reserved_binding + RTC_BINDING_COUNT)
+                r.used_bindings |= 1u << (binding - r.reserved_binding);
+        }
+        for (const ir::Function& function : program_.module.functions)
+            for (const ir::Block& block : function.blocks)
+                r.instruction_count += static_cast<uint32_t>(block.insts.size() + 1);
+
+        std::vector<uint32_t> words = ir::write_module(program_.module, options_.debug_info);
+        if (options_.optimize != Optimization::None) {
+            std::string message;
+            if (!link::optimize(words, options_.optimize, message))
+                ir::fail("optimizer", "", 0, "the optimiser failed: " + message);
+        }
+        // FNV-1a over the code: the identity every handle of this module carries.
+        uint32_t identity = 2166136261u;
+        for (uint32_t word : words) identity = (identity ^ word) * 16777619u;
+        r.identity = identity ? identity : 1;
+        make_groups();
+        embed_reflection(words, r);
+        if (options_.validate) {
+            const uint32_t minor = r.spirv_version >= 0x00010600u ? 3 : r.spirv_version >= 0x00010400u ? 2 : 1;
+            const std::string problem = link::validate(words, minor, false);
+            if (!problem.empty()) {
+                result_.spirv = words;
+                ir::fail("internal-invalid-module", "", 0,
+                         "the linked module is not valid for its target; this is a bug in rtc, or a feature the "
+                         "target lacks: " + problem);
+            }
+        }
+        result_.dump = options_.stop_after.empty() ? "" : ir::to_text(words);
+        result_.spirv = std::move(words);
+        result_.ok = true;
+    }
+
+    void make_groups() {
+        for (const GroupInput& group : input_.groups) {
+            GroupReport report;
+            report.kind = group.kind;
+            report.name = group.name;
+            auto entry = [&](int stage) { return stage < 0 ? 0u : machine_.entry_state(static_cast<uint32_t>(stage)); };
+            report.handle[0] = group.kind == GroupKind::General ? entry(group.general) : entry(group.closest_hit);
+            report.handle[1] = entry(group.any_hit);
+            report.handle[2] = entry(group.intersection);
+            report.handle[3] = static_cast<uint32_t>(group.kind) + 1;
+            report.handle[7] = result_.reflection.identity;
+            result_.reflection.groups.push_back(std::move(report));
+        }
+    }
+
+    const PipelineInput& input_;
+    const LinkOptions& options_;
+    LinkResult& result_;
+    Program program_;
+    Machine machine_;
+    lower::CallKinds kinds_;
+    link::ResourceTable resources_;
+    std::vector<ir::Function> helpers_;
+    bool resumable_ = false;
+    Id main_ = 0;
+};
+
+}  // namespace
+
+LinkResult link_pipeline(const PipelineInput& input, const LinkOptions& options) {
+    LinkResult result;
+    try {
+        Linker(input, options, result).run();
+    } catch (const ir::CompileError& error) {
+        result.ok = false;
+        result.diagnostics.push_back(error.diagnostic);
+    } catch (const std::exception& error) {
+        result.ok = false;
+        result.diagnostics.push_back(
+            {Severity::Error, "internal-error", "", 0, std::string("internal error: ") + error.what()});
+    }
+    return result;
+}
+
+}  // namespace rtc

@@ -1,0 +1,51 @@
+#include <spirv-tools/libspirv.hpp>
+#include <spirv-tools/optimizer.hpp>
+
+#include "link/link.h"
+
+namespace rtc::link {
+namespace {
+
+spv_target_env environment(uint32_t vulkan_minor) {
+    switch (vulkan_minor) {
+        case 1: return SPV_ENV_VULKAN_1_1_SPIRV_1_4;  // 1.4 rules are a superset for what an input may hold
+        case 2: return SPV_ENV_VULKAN_1_2;
+        default: return SPV_ENV_VULKAN_1_3;
+    }
+}
+
+}  // namespace
+
+std::string validate(const std::vector<uint32_t>& spirv, uint32_t vulkan_minor, bool input) {
+    std::string message;
+    spvtools::SpirvTools tools(input ? SPV_ENV_VULKAN_1_3
+                                     : vulkan_minor == 1 ? SPV_ENV_VULKAN_1_1 : environment(vulkan_minor));
+    tools.SetMessageConsumer([&](spv_message_level_t level, const char*, const spv_position_t&, const char* text) {
+        if (level <= SPV_MSG_ERROR && message.empty()) message = text;
+    });
+    spvtools::ValidatorOptions options;
+    options.SetScalarBlockLayout(true);
+    options.SetUniversalLimit(spv_validator_limit_max_id_bound, 0x3fffff);
+    if (tools.Validate(spirv.data(), spirv.size(), options)) return {};
+    return message.empty() ? "invalid module" : message;
+}
+
+bool optimize(std::vector<uint32_t>& spirv, Optimization level, std::string& message) {
+    spvtools::Optimizer optimizer(SPV_ENV_VULKAN_1_3);
+    optimizer.SetMessageConsumer([&](spv_message_level_t severity, const char*, const spv_position_t&, const char* text) {
+        if (severity <= SPV_MSG_ERROR && message.empty()) message = text;
+    });
+    if (level == Optimization::Performance)
+        optimizer.RegisterPerformancePasses();
+    else
+        optimizer.RegisterSizePasses();
+    spvtools::OptimizerOptions options;
+    options.set_preserve_spec_constants(true);
+    options.set_run_validator(false);
+    std::vector<uint32_t> out;
+    if (!optimizer.Run(spirv.data(), spirv.size(), &out, options)) return false;
+    spirv = std::move(out);
+    return true;
+}
+
+}  // namespace rtc::link

@@ -1,0 +1,84 @@
+// One stage instance on its way through the lowering passes, and the passes.
+// They run in the order listed here (see link/pipeline.cpp for why).
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "ir/emitter.h"
+
+namespace rtc {
+
+namespace continuation {
+class Machine;
+}
+
+namespace lower {
+
+using ir::Block;
+using ir::Function;
+using ir::Id;
+using ir::Inst;
+using ir::Op;
+using ir::Program;
+
+// Code of an inlined function: entered at `entry` (an empty block), left to `exit`.
+// Returns from nested constructs jump straight to `exit`, so both are state boundaries.
+struct InlineRegion {
+    Id entry = 0;
+    Id exit = 0;
+};
+
+struct Stage {
+    StageKind kind = StageKind::RayGen;
+    uint32_t index = 0;
+    std::string name;
+    std::string file;
+    Function body;                     // the entry point's function
+    std::vector<Function> functions;   // functions it calls, those not inlined
+    std::vector<InlineRegion> inlined;
+    std::vector<Id> variables;         // its own module-scope variables, in order
+    // Set by interface lowering; all are Private variables of this stage, 0 when unused.
+    Id incoming = 0;                   // incoming payload or callable data
+    Id attribute = 0;                  // hit attribute
+    Id record_base = 0;                // first word of the shader record in its SBT region
+    std::vector<Inst> prologue;        // runs when the stage is entered
+    uint32_t record_bytes = 0;
+
+    [[noreturn]] void fail(const std::string& id, const ir::SourceLine& source, const std::string& text,
+                           const Program& program) const;
+};
+
+// Can the instruction suspend the stage? Set by the pipeline: reportIntersection
+// does only where an any-hit shader may have to run in between.
+struct CallKinds {
+    bool report_suspends = false;
+};
+bool is_call(const Inst& inst, const CallKinds& kinds);
+inline bool is_trace(Op op) { return op == Op::OpTraceRayKHR; }
+inline bool is_callable(Op op) { return op == Op::OpExecuteCallableKHR; }
+inline bool is_report(Op op) { return op == Op::OpReportIntersectionKHR; }
+
+// entry.cpp: checks the module's rules for its stage and picks the entry point's functions; sets
+// Stage::body, functions, variables. `functions` are the imported functions of the stage's module.
+void select_entry(Program& program, Stage& stage, std::vector<Function> functions, Id entry);
+
+// exits.cpp: NV's ignore/terminate become terminators; NV's trace and callable locations become variables.
+void normalize_calls(Program& program, Stage& stage);
+
+// inline.cpp: inlines every function on a path to a call or an exit.
+void inline_calls(Program& program, Stage& stage, const CallKinds& kinds);
+
+// interface.cpp: acceleration structures become root words; payload, attribute and callable variables become
+// Private; built-ins become Private variables set on entry or globals of the traversal.
+void lower_interface(Program& program, Stage& stage, continuation::Machine& machine);
+
+// records.cpp: loads from the shader record become word loads from the SBT.
+void lower_records(Program& program, Stage& stage, continuation::Machine& machine);
+
+// memory.cpp: every call ends its block, no phi is left, and no value is used outside the block that makes it.
+void to_memory_form(Program& program, Stage& stage, const CallKinds& kinds);
+
+}  // namespace lower
+}  // namespace rtc
