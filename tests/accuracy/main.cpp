@@ -1,0 +1,42 @@
+#include <map>
+#include <memory>
+
+#include "lab_fixture.h"
+
+namespace rtc::lab {
+namespace {
+
+std::unique_ptr<tools::Context> context;
+std::map<Variant, std::unique_ptr<DeviceTracer>> tracers;
+
+}  // namespace
+
+const tools::Context& test_context() {
+    if (!context) {
+        tools::ContextOptions options;
+        options.validate = true;
+        options.all_core_features = true;  // Float64 for the negative control
+        context = std::make_unique<tools::Context>(options);
+    }
+    return *context;
+}
+
+DeviceTracer& shared_tracer(Variant variant) {
+    auto& tracer = tracers[variant];
+    if (!tracer) {
+        TracerOptions options;
+        options.variant = variant;
+        tracer = std::make_unique<DeviceTracer>(test_context(), options);
+    }
+    return *tracer;
+}
+
+}  // namespace rtc::lab
+
+int main(int argc, char** argv) {
+    testing::InitGoogleTest(&argc, argv);
+    const int result = RUN_ALL_TESTS();
+    rtc::lab::tracers.clear();
+    rtc::lab::context.reset();
+    return result;
+}

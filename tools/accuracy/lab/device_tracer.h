@@ -1,0 +1,78 @@
+// Rays through a traversal module on a device.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string_view>
+#include <vector>
+
+#include "host_scene.h"
+#include "vulkan_context.h"
+
+namespace rtc::lab {
+
+struct Ray {
+    Vec3 origin;
+    float tmin = 0;
+    Vec3 direction;
+    float tmax = 0;
+    uint32_t flags = 0;
+    uint32_t mask = 0xff;
+    uint32_t sbt = 0;  // offset | stride << 4 | mode << 8
+    float report_t = 0;
+};
+
+enum RayMode : uint32_t {
+    kIgnore = 1u << 8,      // any-hit ignores every candidate
+    kTerminate = 2u << 8,   // any-hit terminates the ray
+    kNoReport = 4u << 8,    // intersection reports nothing
+    kNullRoot = 8u << 8,
+    kBottomRoot = 16u << 8, // trace a bottom level
+};
+
+struct RayResult {
+    float t;
+    uint32_t kind, instance, primitive, geometry, record;
+    uint32_t attr0, attr1, attr7;
+    uint32_t front, back, boxes;
+    uint32_t turns, suspensions, mismatches, last_opaque;
+    bool operator==(const RayResult&) const = default;
+};
+
+constexpr uint32_t kNoInstance = 0xffffffffu;
+
+enum class Variant { Watertight, Fast, Contracted };
+Variant parse_variant(std::string_view name);  // throws tools::Error
+const char* variant_name(Variant variant);
+
+struct TracerOptions {
+    Variant variant = Variant::Watertight;
+    bool storage_fetch = false;
+    bool while_while = false;
+    uint32_t shared_stack = 0;
+    uint32_t step_budget = 0xffffffffu;
+    bool any_hit = true, aabbs = true, triangles = true, resumable = true;
+};
+
+class DeviceTracer {
+  public:
+    DeviceTracer(const tools::Context& context, const TracerOptions& options);
+    ~DeviceTracer();
+
+    // What a context needs for a variant: Float64 for the negative control.
+    static bool needs_float64(Variant variant) { return variant == Variant::Contracted; }
+
+    void set_scene(const HostScene& scene);
+    std::vector<RayResult> trace(const std::vector<Ray>& rays);
+
+    double seconds = 0;          // of the last trace, on the device
+    uint32_t error = 0;          // launch error of the last trace
+    uint32_t error_count = 0;
+    uint32_t error_detail = 0;
+
+  private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace rtc::lab

@@ -1,0 +1,39 @@
+// What exact arithmetic says about a ray and triangles given as floats.
+#pragma once
+
+#include <gmpxx.h>
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "host_scene.h"
+
+namespace rtc::lab {
+
+struct ExactRay {
+    Vec3 origin, direction;
+    float tmin = 0, tmax = 0;
+};
+
+enum class Verdict { Miss, Hit, Boundary };  // Boundary: on an edge or vertex
+
+// Rational test of one triangle (closed; facing and interval not considered).
+// `t` is exact. Degenerate and parallel triangles are missed.
+Verdict intersect(const ExactRay& ray, const Triangle& triangle, mpq_class* t);
+
+struct ExactHit {
+    uint32_t triangle = 0;
+    double t = 0;           // correctly rounded from the rational
+    bool boundary = false;  // some triangle at or before this hit is touched only on its boundary
+};
+
+// Nearest hit with tmin < t < tmax. A double-precision filter decides what it
+// can with its error bound; the rest is decided in rationals.
+std::optional<ExactHit> nearest(const ExactRay& ray, const std::vector<Triangle>& triangles);
+
+// Smallest barycentric weight of the ray's point in the triangle's plane, in
+// double: how far inside (or outside: negative) it passes.
+double inside_margin(const ExactRay& ray, const Triangle& triangle);
+
+}  // namespace rtc::lab

@@ -1,0 +1,142 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Traversal alone: one lane traces one ray from a buffer and writes what it
+// found. The any-hit and intersection shaders are modes below.
+#include "traversal.glsl"
+
+struct LabRay {
+    vec3 origin;
+    float tmin;
+    vec3 direction;
+    float tmax;
+    uint flags;
+    uint mask;
+    uint sbt; // offset | stride << 4 | LAB_* << 8
+    float report_t; // what the intersection shader reports
+};
+
+struct LabResult {
+    float t;
+    uint kind, instance, primitive, geometry, record;
+    uint attr0, attr1, attr7;
+    uint front, back, boxes; // candidates seen
+    uint turns, suspensions;
+    uint mismatches; // candidates whose object ray differs from traversal's
+    uint last_opaque;
+};
+
+layout(set = 1, binding = 0, std430) readonly buffer LabRays { LabRay lab_rays[]; };
+layout(set = 1, binding = 1, std430) writeonly buffer LabResults { LabResult lab_results[]; };
+
+const uint LAB_IGNORE = 1u; // any-hit: ignore all
+const uint LAB_TERMINATE = 2u; // any-hit: terminateRay
+const uint LAB_NO_REPORT = 4u; // intersection: report nothing
+const uint LAB_ROOT_NULL = 8u;
+const uint LAB_ROOT_BOTTOM = 16u; // a root that is no top level
+
+#ifdef LAB_FUSED
+float lab_fused(const float a, const float b, const float c) { return float(double(a) * double(b) + double(c)); }
+#endif
+
+void lab_check_object_ray(inout uint mismatches) {
+    vec3 o = rtc_object_ray_origin(rtc_ray_root, rtc_cand_instance, rtc_ray_origin);
+    vec3 d = rtc_object_ray_direction(rtc_ray_root, rtc_cand_instance, rtc_ray_direction);
+    vec3 scaled = rtc_trav_direction * rtc_trav_t_up;
+    if (floatBitsToUint(o) != floatBitsToUint(rtc_trav_origin) || floatBitsToUint(d) != floatBitsToUint(scaled)) {
+        mismatches++;
+    }
+}
+
+void main() {
+    if (rtc_launch_begin()) {
+        LabRay r = lab_rays[rtc_launch_id.x];
+        uint mode = r.sbt >> 8u;
+        rtc_ray_root = rtc_param(RTC_PARAM_RAYGEN_OFFSET); // the lab's use of this word
+        rtc_ray_root = (mode & LAB_ROOT_NULL) != 0u ? 0u : rtc_ray_root;
+        rtc_ray_root = (mode & LAB_ROOT_BOTTOM) != 0u ? 16u : rtc_ray_root;
+        rtc_ray_flags = r.flags;
+        rtc_ray_mask = r.mask;
+        rtc_ray_sbt_offset = r.sbt & 15u;
+        rtc_ray_sbt_stride = (r.sbt >> 4u) & 15u;
+        rtc_ray_miss = 0u;
+        rtc_ray_origin = r.origin;
+        rtc_ray_tmin = r.tmin;
+        rtc_ray_direction = r.direction;
+        rtc_ray_tmax = r.tmax;
+        uint front = 0u, back = 0u, boxes = 0u, suspensions = 0u, mismatches = 0u, turns = 0u;
+        rtc_trace_begin();
+        uint step = RTC_STEP_RUNNING;
+        do {
+            step = rtc_trace_step();
+            if (step == RTC_STEP_TRIANGLE) {
+                lab_check_object_ray(mismatches);
+                if (rtc_cand_kind == RTC_HIT_KIND_FRONT) {
+                    front++;
+                } else {
+                    back++;
+                }
+                if ((mode & LAB_IGNORE) == 0u) {
+                    rtc_trace_accept();
+                    if ((mode & LAB_TERMINATE) != 0u) {
+                        rtc_trace_stop();
+                    }
+                }
+            } else if (step == RTC_STEP_AABB) {
+                lab_check_object_ray(mismatches);
+                boxes++;
+                rtc_cand_attr0 = rtc_cand_primitive + 100u;
+                rtc_cand_attr1 = rtc_cand_geometry;
+                rtc_cand_attr2 = 0u;
+                rtc_cand_attr3 = 0u;
+                rtc_cand_attr4 = 0u;
+                rtc_cand_attr5 = 0u;
+                rtc_cand_attr6 = 0u;
+                rtc_cand_attr7 = 77u;
+                if ((mode & LAB_NO_REPORT) == 0u && rtc_report_begin(r.report_t, 5u)) {
+                    if (rtc_cand_opaque != 0u || (mode & LAB_IGNORE) == 0u) {
+                        rtc_trace_accept();
+                        if (rtc_cand_opaque == 0u && (mode & LAB_TERMINATE) != 0u) {
+                            rtc_trace_stop();
+                        }
+                    }
+                }
+            } else if (step == RTC_STEP_SUSPEND) {
+                // As if the lane ended here and another one took over.
+                suspensions++;
+                turns += rtc_turns;
+                rtc_trace_save(0u);
+                rtc_ray_root = 0xdeadu;
+                rtc_hit_t = -1.0;
+                rtc_trav_sp = 77u;
+                rtc_trav_cur = 5u;
+                rtc_trav_nodes = 0u;
+                rtc_trav_tmax = 0.0;
+                rtc_trace_restore(0u);
+                rtc_turns = 0u;
+            }
+        } while (step != RTC_STEP_DONE);
+        LabResult result;
+        result.t = rtc_hit_t;
+        result.kind = rtc_hit_kind;
+        result.instance = rtc_hit_instance;
+        result.primitive = rtc_hit_primitive;
+        result.geometry = rtc_hit_geometry;
+        result.record = rtc_hit_record;
+        result.attr0 = rtc_hit_attr0;
+        result.attr1 = rtc_hit_attr1;
+        result.attr7 = rtc_hit_attr7;
+        result.front = front;
+        result.back = back;
+        result.boxes = boxes;
+        result.turns = rtc_turns + turns;
+        result.suspensions = suspensions;
+        result.mismatches = mismatches;
+        result.last_opaque = rtc_cand_opaque;
+#ifdef LAB_FUSED
+        if (rtc_launch_size.y == 77u) {
+            result.t = lab_fused(result.t, result.t, result.t);
+        }
+#endif
+        lab_results[rtc_launch_id.x] = result;
+    }
+}

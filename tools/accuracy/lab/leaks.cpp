@@ -1,0 +1,93 @@
+#include "leaks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace rtc::lab {
+namespace {
+
+constexpr uint64_t kBatch = 1 << 17;
+
+Vec3 to_world(const Transform& m, const Vec3& p) {
+    float out[3];
+    for (int r = 0; r < 3; ++r) {
+        out[r] = float(double(m[r][0]) * p.x + double(m[r][1]) * p.y + double(m[r][2]) * p.z + m[r][3]);
+    }
+    return {out[0], out[1], out[2]};
+}
+
+}  // namespace
+
+void LeakCounts::add(const LeakCounts& more) {
+    rays += more.rays;
+    unbalanced += more.unbalanced;
+    leaks += more.leaks;
+    missed += more.missed;
+    turns += more.turns;
+    seconds += more.seconds;
+}
+
+HostScene leak_scene(const LeakCase& c) {
+    Instance instance = c.instance;
+    instance.blas = 0;
+    return build_scene({Blas{{{c.mesh->soup(), {}, false}}}}, {instance});
+}
+
+std::vector<Ray> leak_rays(const LeakCase& c, uint64_t count, uint64_t batch) {
+    std::mt19937_64 random(c.seed * 1000003 + batch);
+    std::normal_distribution<double> normal;
+    std::vector<Ray> rays(count);
+    for (Ray& ray : rays) {
+        const Vec3 target = aim_point(*c.mesh, c.aim, random);
+        double v[3] = {normal(random), normal(random), normal(random)};
+        const double length = std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+        const double reach = c.from_inside ? 0.2 : c.distance;
+        Vec3 origin = {float(c.centre.x + v[0] / length * reach * c.size), float(c.centre.y + v[1] / length * reach * c.size),
+                       float(c.centre.z + v[2] / length * reach * c.size)};
+        Vec3 world_origin, direction;
+        if (c.axis_parallel >= 0) {
+            // Along an axis of the object, identity transform: the ray meets the target exactly. The
+            // zeros of the direction carry either sign.
+            float o[3] = {target.x, target.y, target.z}, d[3];
+            for (int i = 0; i < 3; ++i) d[i] = random() & 1 ? 0.0f : -0.0f;
+            const float side = random() & 1 ? 1.0f : -1.0f;
+            o[c.axis_parallel] -= side * float(c.distance * c.size);
+            d[c.axis_parallel] = side;
+            world_origin = {o[0], o[1], o[2]};
+            direction = {d[0], d[1], d[2]};
+        } else {
+            world_origin = to_world(c.instance.object_to_world, origin);
+            const Vec3 world_target = to_world(c.instance.object_to_world, target);
+            direction = {world_target.x - world_origin.x, world_target.y - world_origin.y,
+                         world_target.z - world_origin.z};
+        }
+        ray.origin = world_origin;
+        ray.direction = direction;
+        ray.tmin = 0;
+        ray.tmax = std::numeric_limits<float>::infinity();
+        ray.flags = 2;  // no opaque: the any-hit sees, counts and ignores every candidate
+        ray.sbt = kIgnore;
+    }
+    return rays;
+}
+
+LeakCounts count_leaks(DeviceTracer& tracer, const LeakCase& c, uint64_t total) {
+    LeakCounts counts;
+    for (uint64_t batch = 0; counts.rays < total; ++batch) {
+        const std::vector<Ray> rays = leak_rays(c, std::min(kBatch, total - counts.rays), batch);
+        for (const RayResult& r : tracer.trace(rays)) {
+            const int64_t balance = int64_t(r.back) - int64_t(r.front);
+            const int64_t expected = c.from_inside ? 1 : 0;
+            counts.unbalanced += balance != expected;
+            counts.leaks += c.from_inside ? balance < expected : balance != expected;
+            counts.missed += r.front + r.back == 0;
+            counts.turns += r.turns;
+        }
+        counts.rays += rays.size();
+        counts.seconds += tracer.seconds;
+    }
+    return counts;
+}
+
+}  // namespace rtc::lab

@@ -1,0 +1,43 @@
+// Leaks and double hits, counted without arithmetic: a ray that starts outside
+// a closed surface leaves it as often as it enters, one that starts inside
+// once more. This holds for folded and self-intersecting meshes too, as long
+// as triangles share their vertices, so every deviation is traversal's.
+#pragma once
+
+#include <cstdint>
+
+#include "device_tracer.h"
+#include "meshes.h"
+
+namespace rtc::lab {
+
+struct LeakCase {
+    const IndexedMesh* mesh = nullptr;
+    Instance instance;  // of the mesh
+    Aim aim = Aim::Edge;
+    bool from_inside = false;    // origins near `centre`, which must lie inside the mesh
+    Vec3 centre;                 // of the mesh, object space
+    double size = 1;             // radius of a ball round the mesh
+    double distance = 3;         // of outside origins, in sizes
+    int axis_parallel = -1;      // >= 0: rays run along this axis exactly
+    uint64_t seed = 1;
+};
+
+struct LeakCounts {
+    uint64_t rays = 0;
+    uint64_t unbalanced = 0;  // entries and exits do not match: a leak or a double hit
+    uint64_t leaks = 0;       // of these: too few exits (inside) or entries and exits off by one
+    uint64_t missed = 0;      // aimed rays without any candidate
+    uint64_t turns = 0;
+    double seconds = 0;
+
+    void add(const LeakCounts& more);
+};
+
+// The tracer's scene must hold the case's mesh as its only instance.
+LeakCounts count_leaks(DeviceTracer& tracer, const LeakCase& c, uint64_t rays);
+std::vector<Ray> leak_rays(const LeakCase& c, uint64_t rays, uint64_t batch);
+
+HostScene leak_scene(const LeakCase& c);
+
+}  // namespace rtc::lab
