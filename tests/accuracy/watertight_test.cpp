@@ -59,7 +59,9 @@ TEST_P(Watertight, ClosedMeshesBalance) {
                 EXPECT_EQ(counts.unbalanced, 0u) << base.name << ' ' << aim_name(aim) << (inside ? " inside" : "");
                 // Aimed rays do meet the mesh: the test sees something. (Needles thinner than an ulp of
                 // their offset are gone.)
-                if (base.name != "slivers" || place.offset == 0) EXPECT_LT(counts.missed, kRays / 2) << base.name;
+                if (base.name != "slivers" || place.offset == 0) {
+                    EXPECT_LT(counts.missed, kRays / 2) << base.name;
+                }
             }
         }
     }
@@ -139,7 +141,9 @@ TEST_F(LabTest, NegativeControlLeaks) {
         c.aim = Aim::Vertex;
         const LeakCounts vertices = count_leaks(tracer, c, kRays);
         EXPECT_GT(edges.unbalanced, kRays / 1000) << variant_name(variant);
-        if (variant == Variant::Fast) EXPECT_GT(vertices.unbalanced, kRays / 1000);
+        if (variant == Variant::Fast) {
+            EXPECT_GT(vertices.unbalanced, kRays / 1000);
+        }
     }
 }
 
