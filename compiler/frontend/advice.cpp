@@ -103,10 +103,13 @@ std::string advice_for(const Diagnostic& message, std::string_view line_text,
         const std::string_view before = code_before(code, message.line);
         if (!before.empty() && before.back() == '}' && contains(text, "expecting SEMICOLON"))
             return "a block before this ends in `}`; end it with `};` or an instance name";
-        if (!has_extension)
-            for (std::string_view word : {"rayPayloadNV", "rayPayloadInNV", "hitAttributeNV", "callableDataNV",
-                                          "callableDataInNV", "shaderRecordNV"})
-                if (has_word(line_text, word)) return "write #extension GL_NV_ray_tracing : require";
+        if (!has_extension) {
+            for (std::string_view word : {"accelerationStructure", "rayPayload", "rayPayloadIn", "hitAttribute",
+                                          "callableData", "callableDataIn", "shaderRecord"})
+                for (std::string_view dialect : {"NV", "EXT"})
+                    if (has_word(line_text, std::string(word) + std::string(dialect)))
+                        return "write #extension GL_" + std::string(dialect) + "_ray_tracing : require";
+        }
     }
     if (contains(text, "required extension not requested"))
         return "write #extension GL_NV_ray_tracing : require or #extension GL_EXT_ray_tracing : require";
