@@ -33,6 +33,10 @@ static VkResult create_layouts(RtrDevice d, const VkAllocationCallbacks* a) {
 }
 
 static VkResult create_kernels(RtrDevice d, VkPipelineCache cache, const VkAllocationCallbacks* a) {
+    /* Constant 0: memory fences in divergent code, see kernels/common.glsl. */
+    const VkBool32 fences = strstr(d->support.deviceName, "llvmpipe") == NULL;
+    const VkSpecializationMapEntry entry = {0, 0, sizeof fences};
+    const VkSpecializationInfo specialization = {1, &entry, sizeof fences, &fences};
     uint32_t k;
     for (k = 0; k < RTR_KERNEL_COUNT; k++) {
         const RtrKernelCode* code = rtr_kernel_code((RtrKernel)k);
@@ -48,6 +52,7 @@ static VkResult create_kernels(RtrDevice d, VkPipelineCache cache, const VkAlloc
         info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
         info.stage.module = handle;
         info.stage.pName = "main";
+        info.stage.pSpecializationInfo = &specialization;
         info.layout = d->kernel_layout;
         r = d->vk.CreateComputePipelines(d->device, cache, 1, &info, a, &d->kernels[k]);
         d->vk.DestroyShaderModule(d->device, handle, a);

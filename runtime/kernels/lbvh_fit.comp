@@ -9,17 +9,19 @@
 void main() {
     uint i = lane_index();
     uint n = state[RTR_ST_ACTIVE];
-    if (i >= n || n < 2u) return;
-    uint node = links[p.total + i];
+    uint node = 0xffffffffu;
+    if (i < n && n >= 2u) node = links[p.total + i];
     // At most RTC_MAX_DEPTH turns; the bound also ends a lane if the links were damaged.
-    for (uint turn = 0u; turn < 64u; turn++) {
-        memoryBarrierBuffer();
-        if (atomicAdd(marks[node], 1u) == 0u) return;
-        memoryBarrierBuffer();
-        uvec4 v = info[node];
-        v.w = store_node(node, subtree_of(v.x), subtree_of(v.y), node == 0u);
-        info[node].w = v.w;
-        node = links[node];
-        if (node == 0xffffffffu) return;
+    for (uint turn = 0u; turn < 64u && node != 0xffffffffu; turn++) {
+        device_fence();
+        uint arrived = atomicAdd(marks[node], 1u);
+        device_fence();
+        uint next = 0xffffffffu;
+        if (arrived != 0u) {
+            uvec4 v = info[node];
+            info[node].w = store_node(node, subtree_of(v.x), subtree_of(v.y), node == 0u);
+            next = links[node];
+        }
+        node = next;
     }
 }

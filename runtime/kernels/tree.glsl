@@ -8,19 +8,28 @@ struct Subtree {
     uint height; // of the encoded nodes
 };
 
-Subtree subtree_of_primitive(uint prim) {
-    vec4 a = leaf_box[2u * prim];
-    vec4 b = leaf_box[2u * prim + 1u];
-    return Subtree(a.xyz, b.xyz, half_area(a.xyz, b.xyz) * RTR_COST_SLOT, 1u, 0u, 0u);
-}
-
 Subtree subtree_of(uint child) {
-    if ((child & RTR_CHILD_LEAF) != 0u) return subtree_of_primitive(child & ~RTR_CHILD_LEAF);
-    vec4 a = node_box[2u * child];
-    vec4 b = node_box[2u * child + 1u];
-    uint misc = floatBitsToUint(b.w);
-    return Subtree(a.xyz, b.xyz, a.w, info[child].w & ~RTR_COLLAPSED, misc & RTR_INNER_MASK,
-                   misc >> RTR_HEIGHT_SHIFT);
+    Subtree t;
+    if ((child & RTR_CHILD_LEAF) != 0u) {
+        uint prim = child & ~RTR_CHILD_LEAF;
+        t.lo = leaf_box[2u * prim].xyz;
+        t.hi = leaf_box[2u * prim + 1u].xyz;
+        t.cost = half_area(t.lo, t.hi) * RTR_COST_SLOT;
+        t.count = 1u;
+        t.inner = 0u;
+        t.height = 0u;
+    } else {
+        vec4 a = node_box[2u * child];
+        vec4 b = node_box[2u * child + 1u];
+        uint misc = floatBitsToUint(b.w);
+        t.lo = a.xyz;
+        t.hi = b.xyz;
+        t.cost = a.w;
+        t.count = info[child].w & ~RTR_COLLAPSED;
+        t.inner = misc & RTR_INNER_MASK;
+        t.height = misc >> RTR_HEIGHT_SHIFT;
+    }
+    return t;
 }
 
 // Stores box, cost and counts of `node`; returns the word for info[node].w.
