@@ -160,13 +160,13 @@ std::vector<fs::path> golden_folders(const fs::path& root) {
     return folders;
 }
 
-std::string golden_text(const LinkResult& result) {
+std::string golden_text(const LinkResult& result, bool whole_module) {
     std::string text;
     for (const Diagnostic& d : result.diagnostics) {
         text += d.severity == Severity::Error ? "; error " : "; warning ";
         text += d.id + ": " + d.file + (d.line ? ":" + std::to_string(d.line) : "") + ": " + d.text + "\n";
     }
-    text += result.dump;
+    text += whole_module ? result.dump : canonical_text(result.dump);
     if (!text.empty() && text.back() != '\n') text += '\n';
     return text;
 }

@@ -14,6 +14,9 @@ struct GoldenCase {
     std::string name;
     PipelineInput input;
     LinkOptions options;  // stop_after is the command's `dump`
+
+    // The dump is the finished module, not the states before traversal is linked.
+    bool whole_module() const { return options.stop_after != "split"; }
 };
 
 // Thrown for a set that is itself wrong: unreadable file, bad command, assembly that does not assemble.
@@ -32,8 +35,13 @@ GoldenCase read_golden_case(const std::filesystem::path& folder);
 // All folders below `root` that hold a command, by name.
 std::vector<std::filesystem::path> golden_folders(const std::filesystem::path& root);
 
-// Diagnostics as comment lines, then the dump.
-std::string golden_text(const LinkResult& result);
+// Diagnostics as comment lines, then the dump. Of a dump before traversal is linked only the functions and what they
+// use are kept, in the order of use, with ids that depend on nothing else: an edit of the traversal kernels, whose
+// types and constants the module already shares, leaves the text alone.
+std::string golden_text(const LinkResult& result, bool whole_module);
+
+// What golden_text does to a disassembled module (canonical_text.cpp).
+std::string canonical_text(const std::string& disassembly);
 
 std::vector<uint32_t> assemble_file(const std::filesystem::path& spvasm);
 std::string read_text(const std::filesystem::path& file);
