@@ -88,14 +88,33 @@ Regions::Regions(const ir::Program& program, const lower::Stage& stage, const lo
 }
 
 void Regions::find_constructs(const lower::Stage& stage, const std::map<Id, Id>& idom) {
-    auto dominates = [&](Id a, Id b) {
-        if (!reachable.count(a) || !reachable.count(b)) return false;
-        for (;;) {
-            if (a == b) return true;
-            const Id up = idom.at(b);
-            if (up == b) return false;
-            b = up;
+    // a dominates b iff b's interval in a walk of the dominator tree lies within a's.
+    std::map<Id, std::vector<Id>> children;
+    Id root = 0;
+    for (const auto& [label, up] : idom) {
+        if (label == up) root = label;
+        else children[up].push_back(label);
+    }
+    std::map<Id, std::pair<int, int>> interval;
+    int clock = 0;
+    std::vector<std::pair<Id, size_t>> walk{{root, 0}};
+    interval[root].first = clock++;
+    while (!walk.empty()) {
+        auto& [label, next] = walk.back();
+        const std::vector<Id>& below = children[label];
+        if (next < below.size()) {
+            const Id child = below[next++];
+            interval[child].first = clock++;
+            walk.push_back({child, 0});
+        } else {
+            interval[label].second = clock;
+            walk.pop_back();
         }
+    }
+    auto dominates = [&](Id a, Id b) {
+        const auto ia = interval.find(a), ib = interval.find(b);
+        if (ia == interval.end() || ib == interval.end()) return false;
+        return ia->second.first <= ib->second.first && ib->second.second <= ia->second.second;
     };
     struct Head {
         Construct construct;
@@ -131,8 +150,15 @@ void Regions::find_constructs(const lower::Stage& stage, const std::map<Id, Id>&
         const auto outer = innermost_.find(c.header);
         c.parent = outer == innermost_.end() ? -1 : outer->second;
         const std::set<Id>& within = c.parent >= 0 ? constructs[c.parent].blocks : reachable;
+        // `if (x) continue;` dominates the continue construct of the loop around it without holding it.
+        Id next_turn = 0;
+        for (int up = c.parent; up >= 0 && !next_turn; up = constructs[up].parent)
+            if (constructs[up].is_loop) next_turn = constructs[up].continue_target;
+        if (next_turn && dominates(next_turn, c.header)) next_turn = 0;
         for (Id label : within)
-            if (dominates(c.header, label) && !dominates(c.merge, label)) c.blocks.insert(label);
+            if (dominates(c.header, label) && !dominates(c.merge, label) &&
+                !(next_turn && dominates(next_turn, label)))
+                c.blocks.insert(label);
         const int index = static_cast<int>(constructs.size());
         headed_[c.header] = index;
         for (Id label : c.blocks) innermost_[label] = index;
