@@ -44,8 +44,8 @@ void write_png(const std::string& path, const Picture& picture, bool srgb) {
         if (srgb && !alpha) value = to_srgb(value);
         bytes[i] = uint8_t(std::lround(value * 255.0f));
     }
-    if (!stbi_write_png(path.c_str(), int(picture.width), int(picture.height), int(picture.channels), bytes.data(),
-                        int(picture.width * picture.channels)))
+    if (!stbi_write_png(path.c_str(), int(picture.width), int(picture.height), int(picture.channels),
+                        bytes.data(), int(picture.width * picture.channels)))
         throw Error("cannot write " + path);
 }
 
@@ -58,7 +58,8 @@ void write_pfm(const std::string& path, const Picture& picture) {
          << (little ? "-1.0\n" : "1.0\n");
     for (uint32_t y = picture.height; y-- > 0;)
         for (uint32_t x = 0; x < picture.width; ++x)
-            file.write(reinterpret_cast<const char*>(picture.at(x, y)), std::streamsize(channels * sizeof(float)));
+            file.write(reinterpret_cast<const char*>(picture.at(x, y)),
+                       std::streamsize(channels * sizeof(float)));
     if (!file) throw Error("cannot write " + path);
 }
 

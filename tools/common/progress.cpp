@@ -8,8 +8,11 @@
 namespace rtc::tools {
 
 Progress::Progress(std::string label, uint64_t steps, bool quiet)
-    : label_(std::move(label)), steps_(steps ? steps : 1), quiet_(quiet),
-      start_(std::chrono::steady_clock::now()), last_(start_) {}
+    : label_(std::move(label)),
+      steps_(steps ? steps : 1),
+      quiet_(quiet),
+      start_(std::chrono::steady_clock::now()),
+      last_(start_) {}
 
 double Progress::seconds() const {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();

@@ -19,13 +19,17 @@ const char* job_stage_suffix(JobStage stage);  // "rgen", "rint", ...
 
 struct JobShader {
     JobStage stage = JobStage::RayGen;
-    std::string name;                   // unique in the pipeline
-    std::string file;                   // GLSL to compile; used when `spirv` is empty
-    std::vector<uint32_t> spirv;        // one module with ray tracing instructions
+    std::string name;             // unique in the pipeline
+    std::string file;             // GLSL to compile; used when `spirv` is empty
+    std::vector<uint32_t> spirv;  // one module with ray tracing instructions
     std::string entry = "main";
-    struct Constant { uint32_t id; uint64_t value; uint32_t bytes = 4; };
-    std::vector<Constant> constants;    // specialisation
-    std::vector<std::string> defines;   // "NAME" or "NAME=VALUE", for GLSL
+    struct Constant {
+        uint32_t id;
+        uint64_t value;
+        uint32_t bytes = 4;
+    };
+    std::vector<Constant> constants;   // specialisation
+    std::vector<std::string> defines;  // "NAME" or "NAME=VALUE", for GLSL
 };
 
 // Indices into JobPipeline::shaders, -1 for none. `general` set: a general group.
@@ -43,13 +47,13 @@ struct JobPipeline {
 };
 
 struct JobRecord {
-    uint32_t group = ~0u;        // ~0u: a null group (a zero handle)
-    std::vector<uint8_t> data;   // after the handle
+    uint32_t group = ~0u;       // ~0u: a null group (a zero handle)
+    std::vector<uint8_t> data;  // after the handle
 };
 
 struct JobTable {
     std::vector<JobRecord> raygen, miss, hit, callable;
-    uint32_t raygen_index = 0;   // which raygen record the launch starts
+    uint32_t raygen_index = 0;  // which raygen record the launch starts
 };
 
 // A descriptor: buffers, images, or acceleration structures (filled by the executor).

@@ -33,8 +33,8 @@ VkDeviceMemory allocate(const Context& context, const VkMemoryRequirements& need
     VkDeviceMemory memory = VK_NULL_HANDLE;
     const VkResult result = vkAllocateMemory(context.device, &info, nullptr, &memory);
     if (result != VK_SUCCESS)
-        throw Error("cannot allocate " + std::to_string(needed.size >> 20) + " MiB of device memory: " +
-                    result_name(result));
+        throw Error("cannot allocate " + std::to_string(needed.size >> 20) +
+                    " MiB of device memory: " + result_name(result));
     return memory;
 }
 
@@ -50,8 +50,8 @@ void transition(VkCommandBuffer commands, const Image& image, VkImageLayout from
     barrier.srcQueueFamilyIndex = barrier.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
     barrier.image = image.handle;
     barrier.subresourceRange = {kAspect, 0, 1, 0, image.desc.layers};
-    vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, 0, 0,
-                         nullptr, 0, nullptr, 1, &barrier);
+    vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, 0,
+                         0, nullptr, 0, nullptr, 1, &barrier);
 }
 
 VkBufferImageCopy whole_image(const ImageDesc& desc) {
@@ -142,7 +142,8 @@ std::vector<uint8_t> download_buffer(const Context& context, const Buffer& buffe
 }
 
 Image::Image(const Context& context, const ImageDesc& desc_) : desc(desc_), device_(context.device) {
-    const bool cube = desc.view_type == VK_IMAGE_VIEW_TYPE_CUBE || desc.view_type == VK_IMAGE_VIEW_TYPE_CUBE_ARRAY;
+    const bool cube =
+        desc.view_type == VK_IMAGE_VIEW_TYPE_CUBE || desc.view_type == VK_IMAGE_VIEW_TYPE_CUBE_ARRAY;
     VkImageCreateInfo info{};
     info.sType = VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO;
     info.flags = cube ? VK_IMAGE_CREATE_CUBE_COMPATIBLE_BIT : 0;
@@ -275,7 +276,8 @@ std::vector<uint8_t> download_image(const Context& context, const Image& image) 
 void upload_image(const Context& context, const Image& image, std::span<const uint8_t> texels) {
     const size_t bytes = image_bytes(image.desc);
     if (texels.size() != bytes)
-        throw Error("image data has " + std::to_string(texels.size()) + " bytes, not " + std::to_string(bytes));
+        throw Error("image data has " + std::to_string(texels.size()) + " bytes, not " +
+                    std::to_string(bytes));
     Buffer staging(context, bytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, MemoryKind::Host);
     std::memcpy(staging.mapped, texels.data(), bytes);
     context.run([&](VkCommandBuffer commands) {

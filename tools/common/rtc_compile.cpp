@@ -36,8 +36,10 @@ Options make_options(const JobPipeline& pipeline, const CompileOptions& wanted) 
             "the optimisation level");
     require(rtcc_options_set_debug_info(options.get(), wanted.debug_info), "debug info");
     require(rtcc_options_set_resumable(options.get(), wanted.resumable), "resumable");
-    require(rtcc_options_set_max_recursion_depth(options.get(), pipeline.max_recursion), "the recursion depth");
-    require(rtcc_options_set_max_callable_depth(options.get(), pipeline.max_callable_depth), "the callable depth");
+    require(rtcc_options_set_max_recursion_depth(options.get(), pipeline.max_recursion),
+            "the recursion depth");
+    require(rtcc_options_set_max_callable_depth(options.get(), pipeline.max_callable_depth),
+            "the callable depth");
     require(rtcc_options_set_reserved(options.get(), wanted.reserved_set, wanted.reserved_binding),
             "the reserved set");
     return options;
@@ -58,7 +60,8 @@ std::vector<uint32_t> compile_with_macros(rtcc_const_compiler_t compiler, rtcc_c
     for (const std::string& macro : shader.defines) define(options.get(), macro);
     Result result(rtcc_compile_stage(compiler, rtcc_stage(shader.stage), shader.file.c_str(), source.data(),
                                      source.size(), options.get()));
-    if (rtcc_result_status(result.get()) != RTCC_STATUS_SUCCESS) throw Error(rtcc_result_messages(result.get()));
+    if (rtcc_result_status(result.get()) != RTCC_STATUS_SUCCESS)
+        throw Error(rtcc_result_messages(result.get()));
     warnings += rtcc_result_messages(result.get());
     const uint32_t* words = rtcc_result_words(result.get());
     return {words, words + rtcc_result_word_count(result.get())};
@@ -76,7 +79,8 @@ std::string read_text_file(const std::string& path) {
 
 std::vector<uint32_t> read_words_file(const std::string& path) {
     const std::string bytes = read_text_file(path);
-    if (bytes.empty() || bytes.size() % 4) throw Error(path + " is not SPIR-V: its size is not a multiple of 4");
+    if (bytes.empty() || bytes.size() % 4)
+        throw Error(path + " is not SPIR-V: its size is not a multiple of 4");
     std::vector<uint32_t> words(bytes.size() / 4);
     std::memcpy(words.data(), bytes.data(), bytes.size());
     return words;
@@ -97,11 +101,12 @@ CompiledModule compile_job(const JobPipeline& job, const CompileOptions& wanted)
         if (spirv.empty() && !shader.defines.empty())
             spirv = compile_with_macros(compiler.get(), options.get(), shader, source, compiled.warnings);
         const int32_t stage =
-            spirv.empty() ? rtcc_pipeline_add_glsl(pipeline.get(), rtcc_stage(shader.stage), shader.name.c_str(),
-                                                   shader.file.c_str(), source.data(), source.size())
-                          : rtcc_pipeline_add_spirv(pipeline.get(), rtcc_stage(shader.stage), shader.name.c_str(),
-                                                    shader.file.c_str(), spirv.data(), spirv.size(),
-                                                    shader.entry.c_str());
+            spirv.empty()
+                ? rtcc_pipeline_add_glsl(pipeline.get(), rtcc_stage(shader.stage), shader.name.c_str(),
+                                         shader.file.c_str(), source.data(), source.size())
+                : rtcc_pipeline_add_spirv(pipeline.get(), rtcc_stage(shader.stage), shader.name.c_str(),
+                                          shader.file.c_str(), spirv.data(), spirv.size(),
+                                          shader.entry.c_str());
         if (stage < 0) throw Error("stage '" + shader.name + "' was refused: is its name used twice?");
         for (const JobShader::Constant& constant : shader.constants)
             require(rtcc_pipeline_specialize(pipeline.get(), stage, constant.id, constant.value),
@@ -121,7 +126,8 @@ CompiledModule compile_job(const JobPipeline& job, const CompileOptions& wanted)
     Result result(rtcc_compile_pipeline(compiler.get(), pipeline.get(), options.get()));
     if (rtcc_result_status(result.get()) != RTCC_STATUS_SUCCESS) {
         const std::string messages = rtcc_result_messages(result.get());
-        throw Error(messages.empty() ? "the pipeline does not compile" : "the pipeline does not compile:\n" + messages);
+        throw Error(messages.empty() ? "the pipeline does not compile"
+                                     : "the pipeline does not compile:\n" + messages);
     }
     compiled.warnings += rtcc_result_messages(result.get());
     const uint32_t* words = rtcc_result_words(result.get());

@@ -19,7 +19,7 @@ struct CompileOptions {
 
 struct CompiledModule {
     std::vector<uint32_t> words;
-    std::string warnings;         // "file:line: warning: ..." lines
+    std::string warnings;  // "file:line: warning: ..." lines
     std::string reflection_json;
     double seconds = 0;
 };
@@ -27,7 +27,7 @@ struct CompiledModule {
 // Throws Error with the compiler's messages.
 CompiledModule compile_job(const JobPipeline& pipeline, const CompileOptions& options = {});
 
-std::string read_text_file(const std::string& path);           // throws Error
+std::string read_text_file(const std::string& path);             // throws Error
 std::vector<uint32_t> read_words_file(const std::string& path);  // throws Error unless whole words
 
 }  // namespace rtc::tools

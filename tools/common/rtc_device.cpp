@@ -24,12 +24,13 @@ VKAPI_ATTR VkBool32 VKAPI_CALL collect(VkDebugUtilsMessageSeverityFlagBitsEXT se
 
 RtcDevice::RtcDevice(const Context& context_)
     : context(context_), messages_(std::make_unique<std::string>()) {
-    tools::check(rtrGetPhysicalDeviceSupport(context.instance, context.physical, vkGetInstanceProcAddr, &support),
-                 "rtrGetPhysicalDeviceSupport");
+    tools::check(
+        rtrGetPhysicalDeviceSupport(context.instance, context.physical, vkGetInstanceProcAddr, &support),
+        "rtrGetPhysicalDeviceSupport");
     VkDebugUtilsMessengerCreateInfoEXT messenger{};
     messenger.sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT;
-    messenger.messageSeverity = VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT |
-                                VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT;
+    messenger.messageSeverity =
+        VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT;
     messenger.messageType =
         VK_DEBUG_UTILS_MESSAGE_TYPE_GENERAL_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT;
     messenger.pfnUserCallback = collect;

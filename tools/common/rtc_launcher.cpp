@@ -16,8 +16,8 @@ constexpr uint32_t kRounds = 64;  // the runtime's default
 std::vector<RtrSbtRecord> convert(const std::vector<JobRecord>& records) {
     std::vector<RtrSbtRecord> converted;
     for (const JobRecord& record : records)
-        converted.push_back({record.group == ~0u ? RTR_NULL_GROUP : record.group, uint32_t(record.data.size()),
-                             record.data.data()});
+        converted.push_back({record.group == ~0u ? RTR_NULL_GROUP : record.group,
+                             uint32_t(record.data.size()), record.data.data()});
     return converted;
 }
 
@@ -67,8 +67,8 @@ void RtcLauncher::make_descriptors(const RtcScene& scene, const RayTracingJob& j
         std::vector<VkDescriptorSetLayoutBinding> bindings;
         for (const JobBinding& binding : job.bindings)
             if (binding.set == set)
-                bindings.push_back({binding.binding, type_of(binding), binding.count, VK_SHADER_STAGE_COMPUTE_BIT,
-                                    nullptr});
+                bindings.push_back(
+                    {binding.binding, type_of(binding), binding.count, VK_SHADER_STAGE_COMPUTE_BIT, nullptr});
         VkDescriptorSetLayoutCreateInfo info{};
         info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO;
         info.bindingCount = uint32_t(bindings.size());
@@ -123,8 +123,8 @@ void RtcLauncher::make_table(const JobTable& table) {
 
 void RtcLauncher::make_recorder(const RtcScene& scene) {
     VkDeviceSize minimum = 0;
-    const VkDeviceSize full = rtrGetLaunchScratchSize(device_.handle, pipeline_, extent_.width, extent_.height,
-                                                      extent_.depth, &minimum);
+    const VkDeviceSize full = rtrGetLaunchScratchSize(device_.handle, pipeline_, extent_.width,
+                                                      extent_.height, extent_.depth, &minimum);
     uint32_t tiles = 1;
     if (full) {
         const VkDeviceSize size = std::max(minimum, std::min(full, kScratchLimit));
@@ -151,23 +151,26 @@ void RtcLauncher::record(VkCommandBuffer commands, const std::vector<uint8_t>& p
                           "rtrCmdSetLaunchScratch");
         device_.check(rtrCmdBindPipeline(recorder_, pipeline_), "rtrCmdBindPipeline");
         if (!sets_.empty())
-            device_.check(rtrCmdBindDescriptorSets(recorder_, 0, uint32_t(sets_.size()), sets_.data(), 0, nullptr),
-                          "rtrCmdBindDescriptorSets");
+            device_.check(
+                rtrCmdBindDescriptorSets(recorder_, 0, uint32_t(sets_.size()), sets_.data(), 0, nullptr),
+                "rtrCmdBindDescriptorSets");
         recording_ = commands;
     }
     if (!push_constants.empty())
-        device_.check(rtrCmdPushConstants(recorder_, 0, uint32_t(push_constants.size()), push_constants.data()),
-                      "rtrCmdPushConstants");
+        device_.check(
+            rtrCmdPushConstants(recorder_, 0, uint32_t(push_constants.size()), push_constants.data()),
+            "rtrCmdPushConstants");
     auto region = [&](const RtrSbtRegion& part) {
-        return RtrStridedBufferRegion{part.size ? table_.handle : VK_NULL_HANDLE, part.offset, part.stride, part.size};
+        return RtrStridedBufferRegion{part.size ? table_.handle : VK_NULL_HANDLE, part.offset, part.stride,
+                                      part.size};
     };
     RtrStridedBufferRegion raygen = region(table_layout_.raygen);
     raygen.offset = raygen_offset_;
     raygen.size = raygen.stride;
     const RtrStridedBufferRegion miss = region(table_layout_.miss), hit = region(table_layout_.hit),
                                  callable = region(table_layout_.callable);
-    device_.check(rtrCmdTraceRaysRegions(recorder_, &raygen, &miss, &hit, &callable, extent_.width, extent_.height,
-                                         extent_.depth),
+    device_.check(rtrCmdTraceRaysRegions(recorder_, &raygen, &miss, &hit, &callable, extent_.width,
+                                         extent_.height, extent_.depth),
                   "rtrCmdTraceRaysRegions");
     full_barrier(commands);
 }

@@ -120,11 +120,12 @@ RtcScene::RtcScene(const RtcDevice& device, const Scene& scene, bool fast_build)
     VkDeviceSize scratch_size = 0;
     std::vector<VkDeviceSize> sizes;
     for (RtrAccelerationStructure structure : all) {
-        sizes.push_back(
-            requirement(device.handle, structure, VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_OBJECT_NV));
+        sizes.push_back(requirement(device.handle, structure,
+                                    VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_OBJECT_NV));
         bytes += sizes.back();
-        scratch_size = std::max(scratch_size, requirement(device.handle, structure,
-                                                          VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_BUILD_SCRATCH_NV));
+        scratch_size = std::max(
+            scratch_size, requirement(device.handle, structure,
+                                      VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_BUILD_SCRATCH_NV));
     }
     const VkDeviceSize heap_size = bytes + 2 * kAlign;
     heap_buffer_ = Buffer(context, heap_size, RTR_HEAP_BUFFER_USAGE, MemoryKind::Device);
@@ -144,8 +145,8 @@ RtcScene::RtcScene(const RtcDevice& device, const Scene& scene, bool fast_build)
     std::vector<VkAccelerationStructureInstanceNV> instances;
     for (const Instance& instance : scene.instances) {
         uint64_t reference = 0;
-        device.check(rtrGetAccelerationStructureHandle(device.handle, bottoms_[instance.mesh], sizeof reference,
-                                                       &reference),
+        device.check(rtrGetAccelerationStructureHandle(device.handle, bottoms_[instance.mesh],
+                                                       sizeof reference, &reference),
                      "rtrGetAccelerationStructureHandle");
         instances.push_back(convert(instance, reference));
     }
@@ -160,9 +161,9 @@ RtcScene::RtcScene(const RtcDevice& device, const Scene& scene, bool fast_build)
         device.check(rtrCmdInitializeHeap(recorder, heap), "rtrCmdInitializeHeap");
         for (size_t i = 0; i < all.size(); ++i) {
             const bool is_top = i + 1 == all.size();
-            device.check(rtrCmdBuildAccelerationStructure(
-                             recorder, &infos[i], is_top ? instance_buffer.handle : VK_NULL_HANDLE, 0, VK_FALSE,
-                             all[i], nullptr, scratch.handle, 0),
+            device.check(rtrCmdBuildAccelerationStructure(recorder, &infos[i],
+                                                          is_top ? instance_buffer.handle : VK_NULL_HANDLE, 0,
+                                                          VK_FALSE, all[i], nullptr, scratch.handle, 0),
                          "rtrCmdBuildAccelerationStructure");
             full_barrier(commands);  // the scratch is shared, and the top level reads the others
         }

@@ -85,7 +85,8 @@ void Scene::finish(bool has_camera) {
         sky_high = glm::vec3(0.55f, 0.7f, 0.95f);
         // A point light near the camera, bright enough for the scene's size.
         const float distance = glm::length(camera.eye - camera.target);
-        lights.push_back({camera.eye + glm::vec3(0.5f, 1.0f, 0.2f) * distance, glm::vec3(6.0f * distance * distance)});
+        lights.push_back(
+            {camera.eye + glm::vec3(0.5f, 1.0f, 0.2f) * distance, glm::vec3(6.0f * distance * distance)});
     }
 }
 
@@ -99,7 +100,8 @@ std::vector<EmissiveTriangle> emissive_triangles(const Scene& scene) {
             if (std::max({material.emission.x, material.emission.y, material.emission.z}) <= 0.0f) continue;
             glm::vec3 v[3];
             for (int k = 0; k < 3; ++k)
-                v[k] = glm::vec3(instance.transform * glm::vec4(mesh.positions[mesh.indices[3 * t + k]], 1.0f));
+                v[k] =
+                    glm::vec3(instance.transform * glm::vec4(mesh.positions[mesh.indices[3 * t + k]], 1.0f));
             const float area = 0.5f * glm::length(glm::cross(v[1] - v[0], v[2] - v[0]));
             if (area > 0.0f) found.push_back({v[0], v[1], v[2], material.emission, area, i, t});
         }

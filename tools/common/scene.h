@@ -28,13 +28,15 @@ struct Material {
 struct Mesh {
     std::string name;
     std::vector<glm::vec3> positions;
-    std::vector<glm::vec3> normals;  // one a vertex, or empty: flat shading
-    std::vector<glm::vec2> uvs;      // one a vertex, or empty
-    std::vector<uint32_t> indices;   // three a triangle
-    std::vector<uint32_t> materials; // one a triangle, or empty: `material` for all
+    std::vector<glm::vec3> normals;   // one a vertex, or empty: flat shading
+    std::vector<glm::vec2> uvs;       // one a vertex, or empty
+    std::vector<uint32_t> indices;    // three a triangle
+    std::vector<uint32_t> materials;  // one a triangle, or empty: `material` for all
     uint32_t material = 0;
-    struct Box { glm::vec3 min, max; };
-    std::vector<Box> boxes;          // non-empty: a procedural mesh, positions and indices are empty
+    struct Box {
+        glm::vec3 min, max;
+    };
+    std::vector<Box> boxes;  // non-empty: a procedural mesh, positions and indices are empty
     bool opaque = true;
     bool no_duplicate_any_hit = false;
 
@@ -49,8 +51,8 @@ struct Instance {
     glm::mat4 transform{1.0f};
     uint32_t custom_index = 0;  // 24 bits; the loaders set it to the instance's position
     uint32_t mask = 0xff;
-    uint32_t sbt_offset = 0;    // 24 bits, in records
-    uint32_t flags = 0;         // VkGeometryInstanceFlagsNV
+    uint32_t sbt_offset = 0;  // 24 bits, in records
+    uint32_t flags = 0;       // VkGeometryInstanceFlagsNV
 };
 
 struct PointLight {
@@ -70,10 +72,10 @@ struct Scene {
     std::vector<Mesh> meshes;
     std::vector<Material> materials;  // never empty after finish()
     std::vector<Instance> instances;
-    std::vector<PointLight> lights;   // emissive triangles are lights too, see emissive_triangles()
-    glm::vec3 sky_low{0.0f};          // radiance of the surroundings: below the horizon,
-    glm::vec3 sky_high{0.0f};         // and at the zenith; linear in the direction's y between
-    std::vector<Picture> textures;    // linear RGBA
+    std::vector<PointLight> lights;  // emissive triangles are lights too, see emissive_triangles()
+    glm::vec3 sky_low{0.0f};         // radiance of the surroundings: below the horizon,
+    glm::vec3 sky_high{0.0f};        // and at the zenith; linear in the direction's y between
+    std::vector<Picture> textures;   // linear RGBA
     Camera camera;
 
     // Adds what may be missing (a material, custom indices, a camera that sees everything, a light if

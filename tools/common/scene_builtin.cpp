@@ -44,14 +44,15 @@ Scene cornell() {
     const uint32_t green = add_material(scene, {0.14f, 0.45f, 0.091f});
     const uint32_t lamp = add_material(scene, {0.78f, 0.78f, 0.78f}, 0, 1, {17.0f, 12.0f, 5.0f});
     const uint32_t metal = add_material(scene, {0.95f, 0.79f, 0.5f}, 1.0f, 0.25f);
-    Mesh room = make_quad({-1, -1, -1}, {0, 0, 2}, {2, 0, 0}, white);       // floor
-    append(room, make_quad({-1, 1, -1}, {2, 0, 0}, {0, 0, 2}, white));      // ceiling
-    append(room, make_quad({-1, -1, -1}, {2, 0, 0}, {0, 2, 0}, white));     // back
-    append(room, make_quad({-1, -1, -1}, {0, 2, 0}, {0, 0, 2}, red));       // left
-    append(room, make_quad({1, -1, -1}, {0, 0, 2}, {0, 2, 0}, green));      // right
+    Mesh room = make_quad({-1, -1, -1}, {0, 0, 2}, {2, 0, 0}, white);    // floor
+    append(room, make_quad({-1, 1, -1}, {2, 0, 0}, {0, 0, 2}, white));   // ceiling
+    append(room, make_quad({-1, -1, -1}, {2, 0, 0}, {0, 2, 0}, white));  // back
+    append(room, make_quad({-1, -1, -1}, {0, 2, 0}, {0, 0, 2}, red));    // left
+    append(room, make_quad({1, -1, -1}, {0, 0, 2}, {0, 2, 0}, green));   // right
     place(scene, add_mesh(scene, room, "room"));
     // Just below the ceiling: coplanar surfaces would make ties of every hit there.
-    place(scene, add_mesh(scene, make_quad({-0.24f, 0.995f, -0.22f}, {0.48f, 0, 0}, {0, 0, 0.38f}, lamp), "lamp"));
+    place(scene,
+          add_mesh(scene, make_quad({-0.24f, 0.995f, -0.22f}, {0.48f, 0, 0}, {0, 0, 0.38f}, lamp), "lamp"));
     const uint32_t block = add_mesh(scene, make_box({-0.3f, 0, -0.3f}, {0.3f, 0.6f, 0.3f}, white), "block");
     glm::mat4 tall = glm::translate(glm::mat4(1), {-0.35f, -1, -0.3f});
     tall = glm::scale(glm::rotate(tall, glm::radians(18.0f), {0, 1, 0}), {1, 2, 1});
@@ -70,8 +71,8 @@ void checkerboard(Scene& scene, float half, uint32_t tiles, float y, uint32_t ev
     const float size = 2 * half / float(tiles);
     for (uint32_t i = 0; i < tiles; ++i)
         for (uint32_t k = 0; k < tiles; ++k)
-            append(floor, make_quad({-half + float(i) * size, y, -half + float(k) * size}, {0, 0, size}, {size, 0, 0},
-                                    (i + k) % 2 ? odd : even));
+            append(floor, make_quad({-half + float(i) * size, y, -half + float(k) * size}, {0, 0, size},
+                                    {size, 0, 0}, (i + k) % 2 ? odd : even));
     place(scene, add_mesh(scene, floor, "floor"));
 }
 
@@ -91,9 +92,10 @@ Scene spheres() {
             const bool equator = child < 6;
             const float turn = glm::radians(equator ? 60.0f * float(child) : 120.0f * float(child) + 30.0f);
             const float tilt = glm::radians(equator ? 90.0f : 35.0f);
-            const glm::vec3 axis(std::sin(tilt) * std::cos(turn), std::cos(tilt), std::sin(tilt) * std::sin(turn));
-            const glm::vec3 side = glm::normalize(glm::cross(axis, std::abs(axis.y) < 0.9f ? glm::vec3(0, 1, 0)
-                                                                                           : glm::vec3(1, 0, 0)));
+            const glm::vec3 axis(std::sin(tilt) * std::cos(turn), std::cos(tilt),
+                                 std::sin(tilt) * std::sin(turn));
+            const glm::vec3 side = glm::normalize(
+                glm::cross(axis, std::abs(axis.y) < 0.9f ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0)));
             glm::mat4 local(1.0f);
             local[0] = glm::vec4(side / 3.0f, 0);
             local[1] = glm::vec4(axis / 3.0f, 0);
@@ -140,8 +142,8 @@ Scene terrain() {
             float height = 0, amplitude = 0.5f, frequency = 4.0f / kCells;
             for (int octave = 0; octave < 7; ++octave, amplitude *= 0.5f, frequency *= 2.0f)
                 height += amplitude * value_noise(float(x) * frequency + 7.3f, float(z) * frequency + 1.7f);
-            mesh.positions.push_back({10.0f * float(x) / kCells - 5.0f, 3.2f * height * height,
-                                      10.0f * float(z) / kCells - 5.0f});
+            mesh.positions.push_back(
+                {10.0f * float(x) / kCells - 5.0f, 3.2f * height * height, 10.0f * float(z) / kCells - 5.0f});
         }
     for (int z = 0; z < kCells; ++z)
         for (int x = 0; x < kCells; ++x) {
@@ -172,7 +174,8 @@ Scene furnace() {
     const float reflectances[] = {0.5f, 0.7f, 0.3f};
     uint32_t materials[3];
     for (int i = 0; i < 3; ++i) {
-        materials[i] = add_material(scene, glm::vec3(reflectances[i]), 0, 1, glm::vec3(1.0f - reflectances[i]));
+        materials[i] =
+            add_material(scene, glm::vec3(reflectances[i]), 0, 1, glm::vec3(1.0f - reflectances[i]));
         scene.materials[materials[i]].emits_both_sides = true;
     }
     place(scene, add_mesh(scene, make_quad({-2, -1, -2}, {0, 0, 4}, {4, 0, 0}, materials[0]), "floor"));
@@ -229,7 +232,8 @@ Scene bunny() {
     const glm::mat4 frame = glm::translate(glm::scale(glm::mat4(1), glm::vec3(1.0f / size)), -foot);
     for (Instance& instance : scene.instances) instance.transform = frame * instance.transform;
     place(scene, add_mesh(scene, make_quad({-6, 0, -6}, {0, 0, 12}, {12, 0, 0}, stone), "floor"));
-    place(scene, add_mesh(scene, make_quad({-1.9f, 2.2f, 0.2f}, {0.9f, 0.35f, 0}, {0, 0, 0.9f}, lamp), "lamp"));
+    place(scene,
+          add_mesh(scene, make_quad({-1.9f, 2.2f, 0.2f}, {0.9f, 0.35f, 0}, {0, 0, 0.9f}, lamp), "lamp"));
     scene.sky_low = {0.22f, 0.24f, 0.28f};
     scene.sky_high = {0.35f, 0.48f, 0.7f};
     scene.camera = {{0.25f, 0.85f, 2.35f}, {-0.02f, 0.46f, 0}, {0, 1, 0}, glm::radians(32.0f)};
@@ -239,9 +243,9 @@ Scene bunny() {
 }
 
 const std::map<std::string, Scene (*)()>& generators() {
-    static const std::map<std::string, Scene (*)()> table = {
-        {"cornell", cornell}, {"spheres", spheres},   {"terrain", terrain},
-        {"furnace", furnace}, {"penumbra", penumbra}, {"bunny", bunny}};
+    static const std::map<std::string, Scene (*)()> table = {{"cornell", cornell},   {"spheres", spheres},
+                                                             {"terrain", terrain},   {"furnace", furnace},
+                                                             {"penumbra", penumbra}, {"bunny", bunny}};
     return table;
 }
 

@@ -29,7 +29,8 @@ class Loader {
     Scene load() {
         scene_.name = path_;
         for (const tinygltf::Image& image : model_.images) scene_.textures.push_back(convert(image));
-        for (const tinygltf::Material& material : model_.materials) scene_.materials.push_back(convert(material));
+        for (const tinygltf::Material& material : model_.materials)
+            scene_.materials.push_back(convert(material));
         scene_.materials.emplace_back();  // for primitives that name none
         for (const tinygltf::Mesh& mesh : model_.meshes) load_mesh(mesh);
         const int which = model_.defaultScene >= 0 ? model_.defaultScene : 0;
@@ -68,7 +69,8 @@ class Loader {
                         value = float(image.image[place]) / 255.0f;
                     }
                     if (c < 3)
-                        value = value <= 0.04045f ? value / 12.92f : std::pow((value + 0.055f) / 1.055f, 2.4f);
+                        value =
+                            value <= 0.04045f ? value / 12.92f : std::pow((value + 0.055f) / 1.055f, 2.4f);
                 }
                 picture.pixels[p * 4 + size_t(c)] = value;
             }
@@ -115,13 +117,20 @@ class Loader {
         };
         const bool unit = accessor.normalized;
         switch (accessor.componentType) {
-            case TINYGLTF_COMPONENT_TYPE_FLOAT: return read(0.0f);
-            case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE: return read(uint8_t(0)) / (unit ? 255.0 : 1.0);
-            case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT: return read(uint16_t(0)) / (unit ? 65535.0 : 1.0);
-            case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT: return read(uint32_t(0));
-            case TINYGLTF_COMPONENT_TYPE_BYTE: return std::max(-1.0, read(int8_t(0)) / (unit ? 127.0 : 1.0));
-            case TINYGLTF_COMPONENT_TYPE_SHORT: return std::max(-1.0, read(int16_t(0)) / (unit ? 32767.0 : 1.0));
-            default: fail("an accessor has an unknown component type");
+            case TINYGLTF_COMPONENT_TYPE_FLOAT:
+                return read(0.0f);
+            case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+                return read(uint8_t(0)) / (unit ? 255.0 : 1.0);
+            case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
+                return read(uint16_t(0)) / (unit ? 65535.0 : 1.0);
+            case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
+                return read(uint32_t(0));
+            case TINYGLTF_COMPONENT_TYPE_BYTE:
+                return std::max(-1.0, read(int8_t(0)) / (unit ? 127.0 : 1.0));
+            case TINYGLTF_COMPONENT_TYPE_SHORT:
+                return std::max(-1.0, read(int16_t(0)) / (unit ? 32767.0 : 1.0));
+            default:
+                fail("an accessor has an unknown component type");
         }
     }
 
@@ -129,7 +138,8 @@ class Loader {
     std::vector<glm::vec<N, float>> vectors(int index) const {
         const tinygltf::Accessor& accessor = at(model_.accessors, index, "accessor");
         if (accessor.sparse.isSparse) fail("sparse accessors are not supported");
-        if (tinygltf::GetNumComponentsInType(uint32_t(accessor.type)) < N) fail("an attribute has too few components");
+        if (tinygltf::GetNumComponentsInType(uint32_t(accessor.type)) < N)
+            fail("an attribute has too few components");
         std::vector<glm::vec<N, float>> values(accessor.count);
         for (size_t i = 0; i < values.size(); ++i)
             for (int c = 0; c < N; ++c) values[i][c] = float(component(accessor, i, size_t(c)));
@@ -177,7 +187,8 @@ class Loader {
         if (node.rotation.size() == 4)
             transform *= glm::mat4_cast(glm::quat(float(node.rotation[3]), float(node.rotation[0]),
                                                   float(node.rotation[1]), float(node.rotation[2])));
-        if (node.scale.size() == 3) transform = glm::scale(transform, glm::vec3(glm::make_vec3(node.scale.data())));
+        if (node.scale.size() == 3)
+            transform = glm::scale(transform, glm::vec3(glm::make_vec3(node.scale.data())));
         return transform;
     }
 

@@ -22,9 +22,11 @@ Material convert(const tinyobj::material_t& source, Scene& scene, const std::str
     material.base_color = {source.diffuse[0], source.diffuse[1], source.diffuse[2]};
     material.emission = {source.emission[0], source.emission[1], source.emission[2]};
     material.emits_both_sides = true;
-    // The PBR extension where the file has it, else the Phong exponent (Walter et al. 2007, a = sqrt(2/(n+2))).
+    // The PBR extension where the file has it, else the Phong exponent (Walter et al. 2007, a =
+    // sqrt(2/(n+2))).
     material.metallic = source.metallic;
-    material.roughness = source.roughness > 0 ? source.roughness : std::sqrt(std::sqrt(2.0f / (source.shininess + 2.0f)));
+    material.roughness =
+        source.roughness > 0 ? source.roughness : std::sqrt(std::sqrt(2.0f / (source.shininess + 2.0f)));
     if (!source.diffuse_texname.empty()) {
         auto [place, fresh] = textures.try_emplace(source.diffuse_texname, uint32_t(scene.textures.size()));
         if (fresh) scene.textures.push_back(read_picture(folder + source.diffuse_texname));
@@ -63,9 +65,9 @@ Scene load_obj(const std::string& path) {
         for (const tinyobj::index_t& index : shape.mesh.indices) {
             if (index.vertex_index < 0 || size_t(index.vertex_index) * 3 + 2 >= attributes.vertices.size())
                 throw Error(path + ": a face names a vertex that is not there");
-            auto [place, fresh] = known.try_emplace({index.vertex_index, normals ? index.normal_index : -1,
-                                                     uvs ? index.texcoord_index : -1},
-                                                    uint32_t(mesh.positions.size()));
+            auto [place, fresh] = known.try_emplace(
+                {index.vertex_index, normals ? index.normal_index : -1, uvs ? index.texcoord_index : -1},
+                uint32_t(mesh.positions.size()));
             if (fresh) {
                 const float* v = &attributes.vertices[size_t(index.vertex_index) * 3];
                 mesh.positions.push_back({v[0], v[1], v[2]});
@@ -81,7 +83,8 @@ Scene load_obj(const std::string& path) {
             mesh.indices.push_back(place->second);
         }
         if (mesh.indices.empty()) continue;
-        for (int material : shape.mesh.material_ids) mesh.materials.push_back(material < 0 ? 0u : uint32_t(material));
+        for (int material : shape.mesh.material_ids)
+            mesh.materials.push_back(material < 0 ? 0u : uint32_t(material));
         if (!normals) add_smooth_normals(mesh, kCreaseDegrees);
         Instance instance;
         instance.mesh = uint32_t(scene.meshes.size());

@@ -52,8 +52,7 @@ VkInstance create_instance(bool validate, const VkDebugUtilsMessengerCreateInfoE
     validation.enabledValidationFeatureCount = 1;
     validation.pEnabledValidationFeatures = enabled;
 
-    const char* extensions[] = {VK_EXT_DEBUG_UTILS_EXTENSION_NAME,
-                                VK_EXT_VALIDATION_FEATURES_EXTENSION_NAME};
+    const char* extensions[] = {VK_EXT_DEBUG_UTILS_EXTENSION_NAME, VK_EXT_VALIDATION_FEATURES_EXTENSION_NAME};
     VkInstanceCreateInfo info{};
     info.sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO;
     info.pApplicationInfo = &application;
@@ -67,8 +66,9 @@ VkInstance create_instance(bool validate, const VkDebugUtilsMessengerCreateInfoE
     VkInstance instance = VK_NULL_HANDLE;
     VkResult result = vkCreateInstance(&info, nullptr, &instance);
     if (result == VK_ERROR_LAYER_NOT_PRESENT)
-        throw Error("validation was asked for, but VK_LAYER_KHRONOS_validation is not installed "
-                    "(Debian package vulkan-validationlayers)");
+        throw Error(
+            "validation was asked for, but VK_LAYER_KHRONOS_validation is not installed "
+            "(Debian package vulkan-validationlayers)");
     if (result == VK_ERROR_INCOMPATIBLE_DRIVER)
         throw Error("no Vulkan driver found (Debian package mesa-vulkan-drivers brings lavapipe)");
     check(result, "vkCreateInstance");
@@ -194,9 +194,8 @@ const DeviceInfo& select_device(const std::vector<DeviceInfo>& devices, std::str
         if (fromEnvironment) wanted = fromEnvironment;
     }
     if (wanted.empty())
-        return *std::max_element(devices.begin(), devices.end(), [](const DeviceInfo& a, const DeviceInfo& b) {
-            return rank(a) < rank(b);
-        });
+        return *std::max_element(devices.begin(), devices.end(),
+                                 [](const DeviceInfo& a, const DeviceInfo& b) { return rank(a) < rank(b); });
     std::string list;
     for (const DeviceInfo& info : devices)
         list += "\n  " + std::to_string(info.index) + ": " + describe_device(info.properties, info.driver);
@@ -222,8 +221,8 @@ Context::Context(const ContextOptions& options) : validation_(std::make_unique<V
     validation_->on = options.validate || flag_from_environment("RTC_VALIDATION");
     VkDebugUtilsMessengerCreateInfoEXT messenger{};
     messenger.sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT;
-    messenger.messageSeverity = VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT |
-                                VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT;
+    messenger.messageSeverity =
+        VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT;
     messenger.messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_GENERAL_BIT_EXT |
                             VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT |
                             VK_DEBUG_UTILS_MESSAGE_TYPE_PERFORMANCE_BIT_EXT;
@@ -233,7 +232,8 @@ Context::Context(const ContextOptions& options) : validation_(std::make_unique<V
     if (validation_->on) {
         auto create = reinterpret_cast<PFN_vkCreateDebugUtilsMessengerEXT>(
             vkGetInstanceProcAddr(instance, "vkCreateDebugUtilsMessengerEXT"));
-        check(create(instance, &messenger, nullptr, &validation_->messenger), "vkCreateDebugUtilsMessengerEXT");
+        check(create(instance, &messenger, nullptr, &validation_->messenger),
+              "vkCreateDebugUtilsMessengerEXT");
     }
 
     const std::vector<DeviceInfo> devices = enumerate(instance);
@@ -362,8 +362,8 @@ const std::vector<std::string>& Context::validation_messages() const { return va
 void Context::require_silent_validation() const {
     const size_t count = validation_->messages.texts.size();
     if (count)
-        throw Error(std::to_string(count) + " message(s) from the validation layers, first: " +
-                    validation_->messages.texts.front());
+        throw Error(std::to_string(count) +
+                    " message(s) from the validation layers, first: " + validation_->messages.texts.front());
     if (validation_->on) std::printf("validation: silent (synchronisation validation included)\n");
 }
 

@@ -39,7 +39,8 @@ RtrFloatProbe run_probe(const DeviceInfo& info) {
     check(rtrCreateDevice(&deviceInfo, nullptr, &device), "rtrCreateDevice");
     RtrFloatProbe probe{};
     {
-        const Buffer buffer(context, RTR_FLOAT_PROBE_BYTES, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, MemoryKind::Host);
+        const Buffer buffer(context, RTR_FLOAT_PROBE_BYTES, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
+                            MemoryKind::Host);
         RtrRecorderCreateInfo recorderInfo{};
         RtrRecorder recorder = nullptr;
         check(rtrCreateRecorder(device, &recorderInfo, nullptr, &recorder), "rtrCreateRecorder");
@@ -56,7 +57,9 @@ RtrFloatProbe run_probe(const DeviceInfo& info) {
 }
 
 const char* yes_no(VkBool32 value) { return value ? "yes" : "no"; }
-const char* fetch_name(RtrFetch fetch) { return fetch == RTR_FETCH_TEXEL ? "texel buffer" : "storage buffer"; }
+const char* fetch_name(RtrFetch fetch) {
+    return fetch == RTR_FETCH_TEXEL ? "texel buffer" : "storage buffer";
+}
 std::string mebibytes(VkDeviceSize bytes) { return std::to_string(bytes >> 20) + " MiB"; }
 
 std::string modes(const RtrPhysicalDeviceSupport& support) {
@@ -135,7 +138,8 @@ std::string as_text(const DeviceReport& report) {
     }
     const RtrFloatProbe& probe = report.probe;
     text << "  float arithmetic:     contracts a*b+c: " << yes_no(probe.contractsUnmarked)
-         << ", even where forbidden: " << yes_no(probe.contractsPrecise) << "; fma fused: " << yes_no(probe.fmaIsFused)
+         << ", even where forbidden: " << yes_no(probe.contractsPrecise)
+         << "; fma fused: " << yes_no(probe.fmaIsFused)
          << "\n                        denormals flushed: " << yes_no(probe.flushesDenormals)
          << ", round to nearest even: " << yes_no(probe.roundsToNearestEven)
          << ", exact division: " << yes_no(probe.exactDivision)
@@ -168,11 +172,12 @@ std::string as_json(const std::vector<DeviceReport>& reports) {
         device["buffer_device_address"] = support.addressMode == VK_TRUE;
         device["native_ray_tracing"] = report.native;
         device["needs_resumable_modules"] = support.needsResumableModules == VK_TRUE;
-        device["recommended"] = {{"fetch", support.recommended.fetch == RTR_FETCH_TEXEL ? "texel" : "storage"},
-                                 {"while_while", support.recommended.whileWhile},
-                                 {"shared_stack", support.recommended.sharedStack},
-                                 {"workgroup_size", support.recommended.workgroupSize},
-                                 {"step_budget", support.recommended.stepBudget}};
+        device["recommended"] = {
+            {"fetch", support.recommended.fetch == RTR_FETCH_TEXEL ? "texel" : "storage"},
+            {"while_while", support.recommended.whileWhile},
+            {"shared_stack", support.recommended.sharedStack},
+            {"workgroup_size", support.recommended.workgroupSize},
+            {"step_budget", support.recommended.stepBudget}};
         device["max_heap_bytes_texel"] = support.maxHeapSizeTexel;
         device["max_heap_bytes_storage"] = support.maxHeapSizeStorage;
         device["subgroup_size"] = support.subgroupSize;

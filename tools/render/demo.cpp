@@ -19,7 +19,8 @@ void draw_demo(const RtcDevice& device, const std::string& folder, const RenderO
         {"Cornell box, path traced", "builtin:cornell", "cornell-path.png", Integrator::Path, 32},
         {"sphere flake, recursive reflections", "builtin:spheres", "spheres-reflections.png",
          Integrator::Reflections, 8},
-        {"scanned bunny, 69 666 triangles, path traced", "builtin:bunny", "bunny-path.png", Integrator::Path, 16},
+        {"scanned bunny, 69 666 triangles, path traced", "builtin:bunny", "bunny-path.png", Integrator::Path,
+         16},
     };
     std::filesystem::create_directories(folder);
     const auto start = std::chrono::steady_clock::now();
@@ -31,8 +32,8 @@ void draw_demo(const RtcDevice& device, const std::string& folder, const RenderO
         const RenderResult result = render(device, load_scene(shot.scene), options);
         const std::string path = folder + "/" + shot.file;
         write_picture(path, result.picture);
-        std::printf("wrote %s (compile %.2f s, build %.2f s, trace %.2f s)\n", path.c_str(), result.compile_seconds,
-                    result.build_seconds, result.trace_seconds);
+        std::printf("wrote %s (compile %.2f s, build %.2f s, trace %.2f s)\n", path.c_str(),
+                    result.compile_seconds, result.build_seconds, result.trace_seconds);
     }
     std::printf("\nthree pictures in %s, %.0f s\n", folder.c_str(),
                 std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());

@@ -72,22 +72,29 @@ int main(int argc, char** argv) {
     app.add_option("--width", render.settings.width, "pixels")->capture_default_str();
     app.add_option("--height", render.settings.height, "pixels")->capture_default_str();
     app.add_option("--samples", render.samples, "launches, one jittered sample a pixel each")
-        ->capture_default_str()->check(CLI::Range(1, 1 << 24));
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1 << 24));
     app.add_option("-o,--output", arguments.output, "picture to write: .png, .exr or .pfm");
-    app.add_option("--device", arguments.device, "index or part of the name; default: $RTC_DEVICE, else the best");
-    app.add_flag("--validate", arguments.validate, "Vulkan validation; any message is an error (also RTC_VALIDATION=1)");
+    app.add_option("--device", arguments.device,
+                   "index or part of the name; default: $RTC_DEVICE, else the best");
+    app.add_flag("--validate", arguments.validate,
+                 "Vulkan validation; any message is an error (also RTC_VALIDATION=1)");
     app.add_option("--max-bounces", render.settings.max_bounces, "of a path")->capture_default_str();
-    app.add_option("--shadow-samples", render.settings.shadow_samples, "shadow rays a launch")->capture_default_str();
-    app.add_option("--ao-samples", render.settings.ao_samples, "occlusion rays a launch")->capture_default_str();
+    app.add_option("--shadow-samples", render.settings.shadow_samples, "shadow rays a launch")
+        ->capture_default_str();
+    app.add_option("--ao-samples", render.settings.ao_samples, "occlusion rays a launch")
+        ->capture_default_str();
     app.add_option("--ao-radius", render.settings.ao_radius, "0: a quarter of the scene");
     app.add_option("--eye", arguments.eye, "camera position: X Y Z")->expected(3);
     app.add_option("--target", arguments.target, "what it looks at: X Y Z")->expected(3);
     app.add_option("--fov", arguments.field_of_view, "vertical field of view, degrees");
     app.add_option("--exposure", arguments.exposure, "factor on the picture")->capture_default_str();
     app.add_option("--dialect", arguments.dialect, "shaders to compile: nv or ext")
-        ->capture_default_str()->check(CLI::IsMember({"nv", "ext"}));
+        ->capture_default_str()
+        ->check(CLI::IsMember({"nv", "ext"}));
     app.add_option("--shaders", render.settings.shader_folder, "folder of the shaders (also RTC_SHADERS)");
-    app.add_option("--module", render.modules, "precompiled module, one for each pass, instead of the shaders");
+    app.add_option("--module", render.modules,
+                   "precompiled module, one for each pass, instead of the shaders");
     app.add_option("--save-modules", render.save_modules, "folder to keep the compiled modules in");
     app.add_flag("--fast-build", render.fast_build, "prefer build speed to trace speed");
     app.add_flag("!--no-optimize", render.optimize, "compile without -O");

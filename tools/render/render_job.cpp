@@ -28,7 +28,8 @@ constexpr std::pair<const char*, Integrator> kIntegrators[] = {{"path", Integrat
 
 uint8_t encode_srgb(float linear) {
     const float value = std::clamp(linear, 0.0f, 1.0f);
-    const float encoded = value <= 0.0031308f ? 12.92f * value : 1.055f * std::pow(value, 1.0f / 2.4f) - 0.055f;
+    const float encoded =
+        value <= 0.0031308f ? 12.92f * value : 1.055f * std::pow(value, 1.0f / 2.4f) - 0.055f;
     return uint8_t(std::lround(encoded * 255.0f));
 }
 
@@ -83,11 +84,13 @@ RenderJob::SamplerOwner::~SamplerOwner() {
     if (device) vkDestroySampler(device, handle, nullptr);
 }
 
-RenderJob::RenderJob(const Context& context, const Scene& scene, const RenderSettings& wanted) : settings(wanted) {
+RenderJob::RenderJob(const Context& context, const Scene& scene, const RenderSettings& wanted)
+    : settings(wanted) {
     if (settings.width == 0 || settings.height == 0 || settings.width > 16384 || settings.height > 16384)
         throw Error("the picture's size must be between 1 and 16384 each way");
     for (const Mesh& mesh : scene.meshes)
-        if (mesh.procedural()) throw Error("mesh '" + mesh.name + "' is procedural; rtc-render draws triangles");
+        if (mesh.procedural())
+            throw Error("mesh '" + mesh.name + "' is procedural; rtc-render draws triangles");
     std::string folder = settings.shader_folder.empty() ? default_shader_folder() : settings.shader_folder;
     folder += settings.ext_dialect ? "/ext/" : "/";
 
@@ -151,7 +154,8 @@ void RenderJob::upload_textures(const Context& context, const Scene& scene) {
     }
     desc.layers = std::max(1u, uint32_t(scene.textures.size()));
     if (desc.layers > context.properties.limits.maxImageArrayLayers)
-        throw Error("the scene has " + std::to_string(desc.layers) + " textures, the device's maxImageArrayLayers is " +
+        throw Error("the scene has " + std::to_string(desc.layers) +
+                    " textures, the device's maxImageArrayLayers is " +
                     std::to_string(context.properties.limits.maxImageArrayLayers));
     textures_ = Image(context, desc);
     const size_t layer_texels = size_t(desc.extent.width) * desc.extent.height;
@@ -159,8 +163,8 @@ void RenderJob::upload_textures(const Context& context, const Scene& scene) {
     std::vector<float> resized(layer_texels * 4);
     for (size_t layer = 0; layer < scene.textures.size(); ++layer) {
         const Picture& texture = scene.textures[layer];
-        if (!stbir_resize_float(texture.pixels.data(), int(texture.width), int(texture.height), 0, resized.data(),
-                                int(desc.extent.width), int(desc.extent.height), 0, 4))
+        if (!stbir_resize_float(texture.pixels.data(), int(texture.width), int(texture.height), 0,
+                                resized.data(), int(desc.extent.width), int(desc.extent.height), 0, 4))
             throw Error("a texture cannot be resized");
         for (size_t i = 0; i < resized.size(); ++i)
             texels[layer * layer_texels * 4 + i] =
@@ -177,8 +181,8 @@ void RenderJob::upload_textures(const Context& context, const Scene& scene) {
     check(vkCreateSampler(context.device, &info, nullptr, &sampler_.handle), "vkCreateSampler");
 }
 
-void RenderJob::add_pass(const std::string& folder, const char* raygen, const char* closest_hit, const char* miss,
-                         uint32_t recursion, bool shadows) {
+void RenderJob::add_pass(const std::string& folder, const char* raygen, const char* closest_hit,
+                         const char* miss, uint32_t recursion, bool shadows) {
     RayTracingJob job;
     auto add_shader = [&](JobStage stage, const char* file) {
         JobShader shader;

@@ -40,7 +40,8 @@ std::vector<std::vector<uint32_t>> get_modules(const RtcDevice& device, const Re
             std::filesystem::create_directories(options.save_modules);
             const std::string path = options.save_modules + "/" + pass.pipeline.shaders[0].name + ".spv";
             std::ofstream file(path, std::ios::binary);
-            file.write(reinterpret_cast<const char*>(module.words.data()), std::streamsize(module.words.size() * 4));
+            file.write(reinterpret_cast<const char*>(module.words.data()),
+                       std::streamsize(module.words.size() * 4));
             if (!file) throw Error("cannot write " + path);
         }
     }
@@ -53,13 +54,16 @@ RenderResult render(const RtcDevice& device, const Scene& scene, const RenderOpt
     const Context& context = device.context;
     RenderResult result;
     RenderJob job(context, scene, options.settings);
-    const std::vector<std::vector<uint32_t>> modules = get_modules(device, job, options, result.compile_seconds);
+    const std::vector<std::vector<uint32_t>> modules =
+        get_modules(device, job, options, result.compile_seconds);
     RtcScene structures(device, scene, options.fast_build);
     result.build_seconds = structures.build_seconds;
     if (!options.quiet)
-        std::printf("scene: %s, %zu triangles in %zu meshes, %zu instances; acceleration structures %.1f MiB in %.2f s\n",
-                    scene.name.c_str(), scene.triangle_count(), scene.meshes.size(), scene.instances.size(),
-                    double(structures.bytes) / 1048576.0, structures.build_seconds);
+        std::printf(
+            "scene: %s, %zu triangles in %zu meshes, %zu instances; acceleration structures %.1f MiB in %.2f "
+            "s\n",
+            scene.name.c_str(), scene.triangle_count(), scene.meshes.size(), scene.instances.size(),
+            double(structures.bytes) / 1048576.0, structures.build_seconds);
 
     std::vector<std::unique_ptr<RtcLauncher>> launchers;
     for (size_t i = 0; i < job.passes.size(); ++i) {
@@ -67,8 +71,8 @@ RenderResult render(const RtcDevice& device, const Scene& scene, const RenderOpt
         if (!options.quiet) {
             const RtrPipelineInfo info = launchers.back()->info();
             std::printf("pass: %s, %u states, recursion %u, %zu KiB of SPIR-V\n",
-                        job.passes[i].pipeline.shaders[0].name.c_str(), info.stateCount, info.maxRecursionDepth,
-                        modules[i].size() * 4 / 1024);
+                        job.passes[i].pipeline.shaders[0].name.c_str(), info.stateCount,
+                        info.maxRecursionDepth, modules[i].size() * 4 / 1024);
         }
     }
 

@@ -98,13 +98,15 @@ SceneTables make_tables(const Scene& scene, float aspect) {
             tables.vertices.push_back({glm::vec4(mesh.positions[v], uv.x), glm::vec4(normal, uv.y)});
         }
         for (size_t t = 0; t < mesh.triangle_count(); ++t)
-            tables.triangles.emplace_back(first_vertex + mesh.indices[3 * t], first_vertex + mesh.indices[3 * t + 1],
+            tables.triangles.emplace_back(first_vertex + mesh.indices[3 * t],
+                                          first_vertex + mesh.indices[3 * t + 1],
                                           first_vertex + mesh.indices[3 * t + 2], mesh.triangle_material(t));
     }
     for (const Material& material : scene.materials)
-        tables.materials.push_back({glm::vec4(material.base_color, material.metallic),
-                                    glm::vec4(material.emission, material.roughness),
-                                    {material.base_color_texture, material.emits_both_sides ? 1u : 0u, 0, 0}});
+        tables.materials.push_back(
+            {glm::vec4(material.base_color, material.metallic),
+             glm::vec4(material.emission, material.roughness),
+             {material.base_color_texture, material.emits_both_sides ? 1u : 0u, 0, 0}});
     for (const Instance& instance : scene.instances) {
         InstanceEntry entry;
         const glm::mat4 rows = glm::transpose(instance.transform);
@@ -114,7 +116,8 @@ SceneTables make_tables(const Scene& scene, float aspect) {
             entry.to_world[row] = rows[row];
             entry.to_normal[row] = glm::vec4(inverse[row], 0.0f);
         }
-        entry.mesh = {first_triangle[instance.mesh], scene.meshes[instance.mesh].normals.empty() ? 0u : 1u, 0, 0};
+        entry.mesh = {first_triangle[instance.mesh], scene.meshes[instance.mesh].normals.empty() ? 0u : 1u, 0,
+                      0};
         tables.instances.push_back(entry);
     }
     add_lights(scene, tables);
