@@ -14,8 +14,8 @@ World world_of(const tools::Scene& scene) {
         bottom.name = mesh.name;
         Geometry geometry;
         geometry.boxes = mesh.procedural();
-        geometry.flags = (mesh.opaque ? VK_GEOMETRY_OPAQUE_BIT_KHR : 0u) |
-                         (mesh.no_duplicate_any_hit ? VK_GEOMETRY_NO_DUPLICATE_ANY_HIT_INVOCATION_BIT_KHR : 0u);
+        geometry.flags = (mesh.opaque ? uint32_t(VK_GEOMETRY_OPAQUE_BIT_KHR) : 0u) |
+                         (mesh.no_duplicate_any_hit ? uint32_t(VK_GEOMETRY_NO_DUPLICATE_ANY_HIT_INVOCATION_BIT_KHR) : 0u);
         for (const glm::vec3& p : mesh.positions) geometry.positions.insert(geometry.positions.end(), {p.x, p.y, p.z});
         geometry.indices = mesh.indices;
         for (const auto& box : mesh.boxes)
@@ -158,6 +158,44 @@ StageList::StageList(VkDevice device, const tools::JobPipeline& pipeline) : devi
 
 StageList::~StageList() {
     for (VkShaderModule module : modules_) vkDestroyShaderModule(device_, module, nullptr);
+}
+
+VkBuffer NvGeometries::input(const Context& context, const void* data, size_t bytes, VkBufferUsageFlags usage) {
+    Buffer buffer(context, bytes, usage, tools::MemoryKind::Host);
+    if (bytes) std::memcpy(buffer.mapped, data, bytes);
+    buffers_.push_back(std::move(buffer));
+    return buffers_.back().handle;
+}
+
+NvGeometries::NvGeometries(const Context& context, const Bottom& bottom, VkBufferUsageFlags usage) {
+    for (const Geometry& geometry : bottom.geometries) {
+        VkGeometryNV out{VK_STRUCTURE_TYPE_GEOMETRY_NV};
+        out.flags = geometry.flags;
+        out.geometryType = geometry.boxes ? VK_GEOMETRY_TYPE_AABBS_NV : VK_GEOMETRY_TYPE_TRIANGLES_NV;
+        auto& triangles = out.geometry.triangles;
+        triangles = {VK_STRUCTURE_TYPE_GEOMETRY_TRIANGLES_NV};
+        triangles.vertexFormat = VK_FORMAT_R32G32B32_SFLOAT;
+        triangles.vertexStride = 12;
+        triangles.indexType = VK_INDEX_TYPE_NONE_NV;
+        auto& aabbs = out.geometry.aabbs;
+        aabbs = {VK_STRUCTURE_TYPE_GEOMETRY_AABB_NV};
+        aabbs.stride = 24;
+        auto upload = [&](const auto& data) { return input(context, data.data(), data.size() * sizeof(data[0]), usage); };
+        if (geometry.boxes) {
+            aabbs.aabbData = upload(geometry.bounds);
+            aabbs.numAABBs = geometry.primitive_count();
+        } else {
+            triangles.vertexData = upload(geometry.positions);
+            triangles.vertexCount = uint32_t(geometry.positions.size() / 3);
+            if (!geometry.indices.empty()) {
+                triangles.indexType = VK_INDEX_TYPE_UINT32;
+                triangles.indexData = upload(geometry.indices);
+                triangles.indexCount = uint32_t(geometry.indices.size());
+            }
+            if (!geometry.transform.empty()) triangles.transformData = upload(geometry.transform);
+        }
+        geometries.push_back(out);
+    }
 }
 
 VkAccelerationStructureInstanceKHR instance_of(const Placement& placement, uint64_t reference) {

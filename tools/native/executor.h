@@ -110,10 +110,11 @@ class Executor {
     virtual void create_pipeline(const tools::JobPipeline& pipeline,
                                  const std::vector<VkDescriptorSetLayout>& set_layouts, uint32_t push_bytes) = 0;
     virtual void set_tables(const Tables& tables) = 0;
+    // `top` indexes World::tops; ~0u writes a null acceleration structure where the executor can.
     virtual void write_top(VkDescriptorSet set, uint32_t binding, uint32_t element, uint32_t top) = 0;
     virtual void trace(VkCommandBuffer commands, const Launch& launch) = 0;
-    // After the commands have completed: throws if the launch reported an error.
-    virtual void finish() {}
+    // After the commands have completed: "" or the launch error, as "NAME: text" ("recursion-depth: ...").
+    virtual std::string finish() { return {}; }
     // Device address of a top level, 0 where there is none.
     virtual VkDeviceAddress top_address(uint32_t) const { return 0; }
 };
@@ -153,6 +154,16 @@ class StageList {
     std::vector<VkShaderModule> modules_;
     std::vector<std::unique_ptr<Constants>> constants_;
     std::vector<VkPipelineShaderStageCreateInfo> infos_;
+};
+
+// The geometries of a bottom level as VK_NV_ray_tracing takes them, with the buffers they name.
+struct NvGeometries {
+    NvGeometries(const Context& context, const Bottom& bottom, VkBufferUsageFlags usage);
+    std::vector<VkGeometryNV> geometries;
+
+  private:
+    VkBuffer input(const Context& context, const void* data, size_t bytes, VkBufferUsageFlags usage);
+    std::vector<Buffer> buffers_;
 };
 
 // VkAccelerationStructureInstanceKHR and its NV twin have one layout.

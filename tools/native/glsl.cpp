@@ -127,10 +127,15 @@ std::vector<uint32_t> compile_glsl(const GlslSource& source) {
     return words;
 }
 
+const char* stage_suffix(JobStage stage) {
+    static const char* const names[] = {"rgen", "rint", "rahit", "rchit", "rmiss", "rcall"};
+    return names[uint32_t(stage)];
+}
+
 bool stage_of_suffix(const std::string& suffix, JobStage& stage) {
     for (JobStage s : {JobStage::RayGen, JobStage::Intersection, JobStage::AnyHit, JobStage::ClosestHit, JobStage::Miss,
                        JobStage::Callable})
-        if (suffix == tools::job_stage_suffix(s)) {
+        if (suffix == stage_suffix(s)) {
             stage = s;
             return true;
         }

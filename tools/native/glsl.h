@@ -27,6 +27,7 @@ struct GlslSource {
 // SPIR-V 1.3 for NV sources, 1.4 for EXT ones. Throws tools::Error with the compiler's messages.
 std::vector<uint32_t> compile_glsl(const GlslSource& source);
 
+const char* stage_suffix(tools::JobStage stage);  // "rgen", "rint", ...
 // By file name: a.rgen, a.rgen.glsl; false when the name tells nothing.
 bool stage_of_file(const std::string& path, tools::JobStage& stage);
 bool stage_of_suffix(const std::string& suffix, tools::JobStage& stage);  // "rgen"

@@ -200,44 +200,12 @@ class NvExecutor final : public Executor {
     }
 
     Built build_bottom(const Bottom& bottom) {
-        std::vector<Buffer> buffers;
-        std::vector<VkGeometryNV> geometries;
-        auto keep = [&](Buffer buffer) {
-            buffers.push_back(std::move(buffer));
-            return buffers.back().handle;
-        };
-        for (const Geometry& geometry : bottom.geometries) {
-            VkGeometryNV out{VK_STRUCTURE_TYPE_GEOMETRY_NV};
-            out.flags = geometry.flags;
-            out.geometryType = geometry.boxes ? VK_GEOMETRY_TYPE_AABBS_NV : VK_GEOMETRY_TYPE_TRIANGLES_NV;
-            auto& triangles = out.geometry.triangles;
-            triangles = {VK_STRUCTURE_TYPE_GEOMETRY_TRIANGLES_NV};
-            triangles.vertexFormat = VK_FORMAT_R32G32B32_SFLOAT;
-            triangles.vertexStride = 12;
-            triangles.indexType = VK_INDEX_TYPE_NONE_NV;
-            auto& aabbs = out.geometry.aabbs;
-            aabbs = {VK_STRUCTURE_TYPE_GEOMETRY_AABB_NV};
-            aabbs.stride = 24;
-            if (geometry.boxes) {
-                aabbs.aabbData = keep(input(geometry.bounds));
-                aabbs.numAABBs = geometry.primitive_count();
-            } else {
-                triangles.vertexData = keep(input(geometry.positions));
-                triangles.vertexCount = uint32_t(geometry.positions.size() / 3);
-                if (!geometry.indices.empty()) {
-                    triangles.indexType = VK_INDEX_TYPE_UINT32;
-                    triangles.indexData = keep(input(geometry.indices));
-                    triangles.indexCount = uint32_t(geometry.indices.size());
-                }
-                if (!geometry.transform.empty()) triangles.transformData = keep(input(geometry.transform));
-            }
-            geometries.push_back(out);
-        }
+        NvGeometries input(context_, bottom, VK_BUFFER_USAGE_RAY_TRACING_BIT_NV);
         VkAccelerationStructureInfoNV info{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV};
         info.type = VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_NV;
         info.flags = bottom.flags;
-        info.geometryCount = uint32_t(geometries.size());
-        info.pGeometries = geometries.data();
+        info.geometryCount = uint32_t(input.geometries.size());
+        info.pGeometries = input.geometries.data();
         return build_one(info, VK_NULL_HANDLE);
     }
 
