@@ -38,7 +38,7 @@ class Planner {
                 add_pipeline_file(input.file, files_, plan_);
             } else if (input.kind == InputArgument::Kind::HitGroup) {
                 plan_.add_group(std::move(hit_groups[next_hit_group++]), "rtc: error: ");
-            } else if (!plan_.stages[static_cast<size_t>(stage_of_input_[i])].grouped) {
+            } else if (arguments_.mode == Mode::Link && !plan_.stages[static_cast<size_t>(stage_of_input_[i])].grouped) {
                 plan_.add_own_group(stage_of_input_[i], "rtc: error: ");
             }
         }
