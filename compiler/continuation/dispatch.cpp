@@ -204,7 +204,7 @@ Id Machine::call_entry(Emitter& e, const std::string& region, Id index, uint32_t
     return e.call(entry_function(region), p.uint_type(), {index, p.constant_u32(which)});
 }
 
-Function Machine::build_main() {
+Function Machine::build_main(const std::vector<Function>& stage_functions) {
     const Id u32 = p.uint_type();
     Function main;
     main.def = Inst(Op::OpFunction, p.void_type(), p.module.new_id(), {0, p.function_type(p.void_type(), {})});
@@ -234,7 +234,8 @@ Function Machine::build_main() {
     Emitter begin = code.e();
     const Id inside = call(begin, "rtc_launch_begin");
     code.branch(begin.value(Op::OpLogicalNot, p.bool_type(), {inside}), [&] { code.e().effect(Op::OpReturn, {}); });
-    {
+    const std::vector<Id> carried = resumable ? carried_variables(stage_functions) : std::vector<Id>{};
+    auto start = [&] {
         Emitter e = code.e();
         const Id first = call(e, "rtc_sbt_raygen_word", {p.constant_u32(0)});
         const Id offset = e.value(Op::OpISub, u32, {first, p.constant_u32(kFirstEntry)});
@@ -245,11 +246,27 @@ Function Machine::build_main() {
             call(bad, "rtc_error", {p.constant_u32(RTC_LAUNCH_ERROR_BAD_HANDLE), first, p.constant_u32(0)});
         });
         Emitter init = code.e();
-        for (Id variable : {record, depth, push, pop, callable_depth, report_return, accepted})
-            init.store_u32(variable, 0);
-        init.store(leave, p.constant_bool(false));
+        for (Id variable : {record, depth, callable_depth, report_return, accepted}) init.store_u32(variable, 0);
         init.store(fresh, p.constant_bool(false));
         if (top) init.store_u32(top, 0);
+    };
+    code.e().store_u32(push, 0);
+    code.e().store_u32(pop, 0);
+    code.e().store(leave, p.constant_bool(false));
+    if (resumable) {
+        // Word RTC_PARAM_ROUND of the dispatch parameters.
+        Emitter e = code.e();
+        const Id round = e.load(u32, e.chain(spv::StorageClass::Uniform, u32, reserved.at(RTC_BINDING_PARAMS),
+                                             {p.constant_u32(0), p.constant_u32(RTC_PARAM_ROUND / 4),
+                                              p.constant_u32(RTC_PARAM_ROUND % 4)}));
+        code.branch(e.value(Op::OpIEqual, p.bool_type(), {round, p.constant_u32(0)}), start, [&] {
+            Emitter again = code.e();
+            const Id saved = call(again, "rtc_scratch_load", {p.constant_u32(0)});
+            code.branch(code.equal(saved, kStateDone), [&] { code.e().effect(Op::OpReturn, {}); });
+            emit_transfer(code.blocks, carried, stack, top, false);
+        });
+    } else {
+        start();
     }
 
     // Dispatch loop.
@@ -299,7 +316,14 @@ Function Machine::build_main() {
     code.e().store(leave, p.constant_bool(false));
     const Id current = code.load(state);
     const Id running = p.module.new_id(), done = p.module.new_id();
-    const Id finished = code.equal(current, kStateDone);
+    Id finished = code.equal(current, kStateDone);
+    if (resumable) {
+        Emitter e = code.e();
+        const Id turns = variable("rtc_turns");
+        const Id spent = out_of_budget(e);
+        e.store(turns, e.add(e.load(u32, turns), p.constant_u32(1)));
+        finished = e.value(Op::OpLogicalOr, p.bool_type(), {finished, spent});
+    }
     code.e().effect(Op::OpSelectionMerge, {running, 0});
     code.e().effect(Op::OpBranchConditional, {finished, done, running});
     code.begin(done);
@@ -328,6 +352,23 @@ Function Machine::build_main() {
     code.begin(dispatch);
     code.e().effect(Op::OpBranch, {header});
     code.begin(exit);
+    if (resumable) {
+        Emitter e = code.e();
+        const Id budget = e.value(Op::OpINotEqual, p.bool_type(), {step_budget(), p.constant_u32(0xffffffffu)});
+        code.branch(budget, [&] {
+            code.branch(
+                code.not_equal(code.load(state), kStateDone),
+                [&] {
+                    emit_transfer(code.blocks, carried, stack, top, true);
+                    Emitter s = code.e();
+                    call(s, "rtc_suspend");
+                },
+                [&] {
+                    Emitter s = code.e();
+                    call(s, "rtc_scratch_store", {p.constant_u32(0), p.constant_u32(kStateDone)});
+                });
+        });
+    }
     code.e().effect(Op::OpReturn, {});
 
     main.blocks = std::move(code.blocks);

@@ -109,10 +109,22 @@ class Machine {
     Id entry_function(const std::string& region);
     Id call_entry(Emitter& e, const std::string& region, Id index, uint32_t which);
 
+    // bool: the lane has used up its step budget (never, when lanes cannot suspend).
+    Id out_of_budget(Emitter& e) const;
+    Id step_budget() const;  // the specialisation constant
+    bool resumable = false;
+    // Private variables that belong to shaders: what a suspended lane may have to keep.
+    std::vector<Id> stage_variables;
+
     // ---- assembling (continuation/dispatch.cpp) ----
     // The entry point: launch, dispatch loop, states. Call when all stages are split.
-    Function build_main();
+    Function build_main(const std::vector<Function>& stage_functions);
     std::vector<Function> helper_functions;
+    // Variables that some state reads before writing: they cross from state to state. (resume.cpp)
+    std::vector<Id> carried_variables(const std::vector<Function>& stage_functions) const;
+    // Functions that store and load all of `carried`, the ray and the word stack, in lane storage.
+    // They run in main, so they are blocks, ending open. (resume.cpp)
+    void emit_transfer(std::vector<Block>& blocks, const std::vector<Id>& carried, Id stack, Id top, bool saving);
 
     // Reserved resources by RTC_BINDING_*, set by import_traversal.
     std::map<uint32_t, Id> reserved;

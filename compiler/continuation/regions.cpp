@@ -82,6 +82,15 @@ Regions::Regions(const ir::Program& program, const lower::Stage& stage, const lo
         for (int c = found == innermost_.end() ? -1 : found->second; c >= 0; c = constructs[c].parent)
             constructs[c].cut = true;
     }
+    // So that a long loop can be re-entered, what is around it is cut too.
+    if (kinds.loops_suspend)
+        for (Construct& c : constructs) {
+            if (!c.is_loop) continue;
+            for (const Block& block : stage.body.blocks)
+                if (block.label == c.header) c.can_suspend = !lower::is_short_loop(program, stage.body, block);
+            if (!c.can_suspend) continue;
+            for (int up = c.parent; up >= 0; up = constructs[up].parent) constructs[up].cut = true;
+        }
     for (const Construct& region : constructs)
         if (region.is_inline)
             for (int c = region.parent; c >= 0; c = constructs[c].parent) constructs[c].cut = true;

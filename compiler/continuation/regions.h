@@ -20,6 +20,7 @@ struct Construct {
     bool is_loop = false;
     bool is_inline = false;  // the code of an inlined function; always cut
     bool cut = false;        // contains a call: becomes states
+    bool can_suspend = false;  // a loop that may be long, when lanes can suspend
     int parent = -1;         // index of the enclosing construct
     std::set<Id> blocks;     // labels, header included
 };

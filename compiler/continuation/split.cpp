@@ -93,6 +93,8 @@ class Splitter {
             for (Id target : block.successors())
                 if (!c.blocks.count(target) && target != c.merge) starts_.insert(forward(target));
         }
+        for (const Construct& c : regions_.constructs)
+            if (c.is_loop && c.can_suspend && !c.cut && regions_.is_top(c.header)) starts_.insert(c.header);
         for (const auto& [label, count] : arrivals) {
             const int headed = regions_.headed(label);
             const bool loop = headed >= 0 && regions_.constructs[headed].is_loop && regions_.constructs[headed].cut;
@@ -261,7 +263,7 @@ class Splitter {
         for (size_t c = 0; c < regions_.constructs.size(); ++c) {
             const Construct& loop = regions_.constructs[c];
             if (!loop.is_loop || !region.blocks.count(loop.header)) continue;
-            if (leaves_early(loop, region)) loop_checks[loop.merge] = p_.module.new_id();
+            if (leaves_early(loop, region) || suspends(loop, region)) loop_checks[loop.merge] = p_.module.new_id();
             loop_of_check[loop.merge] = static_cast<int>(c);
         }
         bool first = true;
@@ -312,6 +314,10 @@ class Splitter {
         }
     }
 
+    static bool suspends(const Construct& loop, const Construct& region) {
+        return loop.can_suspend && loop.header == region.header;
+    }
+
     bool leaves_early(const Construct& loop, const Construct& region) const {
         for (Id label : loop.blocks) {
             if (!regions_.reachable.count(label)) continue;
@@ -358,10 +364,14 @@ class Splitter {
 
     void emit_intact_block(const Block& block, int root, const std::map<Id, Id>& checks) {
         const Construct& region = regions_.constructs[root];
-        for (size_t i = 0; i + 1 < block.insts.size(); ++i) {
+        size_t first = 0;
+        if (block.label == region.header && suspends(region, region)) first = emit_budget_check(block, checks);
+        for (size_t i = first; i + 1 < block.insts.size(); ++i) {
             Inst inst = block.insts[i];
-            if (inst.op == Op::OpLoopMerge)
+            if (inst.op == Op::OpLoopMerge) {
+                if (first) continue;  // emitted with the budget check
                 if (const auto check = checks.find(inst.ops[0]); check != checks.end()) inst.ops[0] = check->second;
+            }
             current().insts.push_back(std::move(inst));
         }
         Inst terminator = block.terminator();
@@ -423,6 +433,32 @@ class Splitter {
             begin_block(stub);
             leave_intact(state_of(target), loop, checks);
         }
+    }
+
+    // Header of a loop that can suspend: at the start of each turn, a lane out of budget leaves and comes back
+    // to this very state. Returns the index of the first instruction still to be emitted.
+    size_t emit_budget_check(const Block& block, const std::map<Id, Id>& checks) {
+        const Inst& merge = *block.merge();
+        const Id check = checks.at(merge.ops[0]);
+        const Id test = p_.module.new_id(), out = p_.module.new_id(), rest = p_.module.new_id();
+        // The turn counter in front (lower/loops.cpp) stays in front.
+        size_t first = 0;
+        while (first < 3) current().insts.push_back(block.insts[first++]);
+        Emitter head = emitter();
+        head.effect(Op::OpLoopMerge, {check, merge.ops[1], 0});
+        head.effect(Op::OpBranch, {test});
+        begin_block(test);
+        Emitter e = emitter();
+        const Id exhausted = m_.out_of_budget(e);
+        e.effect(Op::OpSelectionMerge, {rest, 0});
+        e.effect(Op::OpBranchConditional, {exhausted, out, rest});
+        begin_block(out);
+        Emitter leave = emitter();
+        leave.store_u32(m_.state, state_of(block.label));
+        leave.store(m_.leave, p_.constant_bool(true));
+        leave.effect(Op::OpBranch, {check});
+        begin_block(rest);
+        return first;
     }
 
     bool is_break(Id from, Id merge) const {

@@ -103,8 +103,8 @@ class Linker {
             ir::read_module(std::vector<uint32_t>(traversal->words, traversal->words + traversal->count), "traversal");
         // Reports always hand over to the machine: it ends the shader after an accepted first hit.
         kinds_.report_suspends = true;
-        resumable_ = options_.resumable;
-        machine_.import_traversal(module, has(StageKind::AnyHit), has(StageKind::Intersection), resumable_);
+        kinds_.loops_suspend = machine_.resumable = options_.resumable;
+        machine_.import_traversal(module, has(StageKind::AnyHit), has(StageKind::Intersection), machine_.resumable);
         program_.module.version = module.version;
     }
 
@@ -154,6 +154,7 @@ class Linker {
         link::unify_resources(program_, stage, resources_, result_.reflection);
         // Last before the split: earlier passes may still move values between blocks.
         lower::to_memory_form(program_, stage, kinds_);
+        if (machine_.resumable) lower::count_loops(program_, stage, machine_);
 
         StageReport report;
         report.kind = stage.kind;
@@ -167,6 +168,10 @@ class Linker {
         continuation::split_stage(program_, stage, kinds_, machine_);
         report.states = static_cast<uint32_t>(machine_.states.size() - before);
         result_.reflection.stages.push_back(std::move(report));
+        for (Id id : stage.variables)
+            if (static_cast<spv::StorageClass>(program_.def(id)->ops[0]) == spv::StorageClass::Private)
+                machine_.stage_variables.push_back(id);
+        if (stage.record_base) machine_.stage_variables.push_back(stage.record_base);
         for (ir::Function& function : stage.functions) helpers_.push_back(std::move(function));
     }
 
@@ -201,7 +206,7 @@ class Linker {
     }
 
     void assemble() {
-        ir::Function main = machine_.build_main();
+        ir::Function main = machine_.build_main(helpers_);
         main_ = main.id();
         ir::Module& m = program_.module;
         for (ir::Function& function : machine_.traversal_functions) m.functions.push_back(std::move(function));
@@ -221,7 +226,7 @@ class Linker {
         for (const Inst& inst : program_.module.globals) alive.insert(inst.result);
         std::erase_if(program_.module.entry_points[0].interface, [&](Id id) { return !alive.count(id); });
 
-        r.flags = resumable_ ? RTC_MODULE_RESUMABLE : 0;
+        r.flags = machine_.resumable ? RTC_MODULE_RESUMABLE : 0;
         r.state_count = static_cast<uint32_t>(machine_.states.size());
         r.max_recursion_depth = machine_.max_depth;
         r.max_callable_depth = machine_.callables ? machine_.max_callable_depth : 0;
@@ -294,7 +299,6 @@ class Linker {
     lower::CallKinds kinds_;
     link::ResourceTable resources_;
     std::vector<ir::Function> helpers_;
-    bool resumable_ = false;
     Id main_ = 0;
 };
 

@@ -37,8 +37,11 @@ class Inliner {
     }
 
   private:
-    // Functions from which a call or an exit can be reached.
+    // Functions from which a call, an exit or a loop that can suspend is reached.
     void find_suspending() {
+        if (kinds_.loops_suspend)
+            for (const Function& function : stage_.functions)
+                if (has_long_loop(p_, function)) suspending_.insert(function.id());
         for (bool changed = true; changed;) {
             changed = false;
             for (const Function& function : stage_.functions) {

@@ -54,6 +54,7 @@ struct Stage {
 // does only where an any-hit shader may have to run in between.
 struct CallKinds {
     bool report_suspends = false;
+    bool loops_suspend = false;  // long loops can be left in the middle and resumed
 };
 bool is_call(const Inst& inst, const CallKinds& kinds);
 inline bool is_trace(Op op) { return op == Op::OpTraceRayKHR; }
@@ -79,6 +80,11 @@ void lower_records(Program& program, Stage& stage, continuation::Machine& machin
 
 // memory.cpp: every call ends its block, no phi is left, and no value is used outside the block that makes it.
 void to_memory_form(Program& program, Stage& stage, const CallKinds& kinds);
+
+// loops.cpp: counts loop iterations against the step budget. A short loop has a small constant trip count.
+bool is_short_loop(const Program& program, const Function& function, const Block& header);
+bool has_long_loop(const Program& program, const Function& function);
+void count_loops(Program& program, Stage& stage, continuation::Machine& machine);
 
 }  // namespace lower
 }  // namespace rtc
