@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "job_descriptors.h"
 #include "ray_tracing_job.h"
 #include "resources.h"
 #include "scene.h"
@@ -75,7 +76,6 @@ class RtcLauncher {
 
   private:
     static constexpr uint32_t kLaunches = 64;
-    void make_descriptors(const RtcScene& scene, const RayTracingJob& job);
     void make_table(const JobTable& table);
     void make_recorder(const RtcScene& scene);
 
@@ -85,9 +85,7 @@ class RtcLauncher {
     Buffer table_, control_, scratch_;
     RtrSbtLayout table_layout_{};
     VkDeviceSize raygen_offset_ = 0;
-    std::vector<VkDescriptorSetLayout> layouts_;
-    std::vector<VkDescriptorSet> sets_;
-    VkDescriptorPool pool_ = VK_NULL_HANDLE;
+    std::unique_ptr<JobDescriptors> descriptors_;
     VkExtent3D extent_{};
     VkCommandBuffer recording_ = VK_NULL_HANDLE;
     RtrHeap heap_ = nullptr;

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cstring>
-#include <map>
 
 #include "error.h"
 #include "rtc_device.h"
@@ -26,14 +25,27 @@ std::vector<RtrSbtRecord> convert(const std::vector<JobRecord>& records) {
 RtcLauncher::RtcLauncher(const RtcDevice& device, const RtcScene& scene, const RayTracingJob& job,
                          const std::vector<uint32_t>& module)
     : device_(device), extent_{job.width, job.height, job.depth} {
-    make_descriptors(scene, job);
+    descriptors_ = std::make_unique<JobDescriptors>(
+        device.context, job.bindings, VK_SHADER_STAGE_COMPUTE_BIT, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
+        [&](VkDescriptorSet set, uint32_t binding, uint32_t element) {
+            const VkDescriptorBufferInfo structure = scene.descriptor();
+            VkWriteDescriptorSet write{};
+            write.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
+            write.dstSet = set;
+            write.dstBinding = binding;
+            write.dstArrayElement = element;
+            write.descriptorCount = 1;
+            write.descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+            write.pBufferInfo = &structure;
+            vkUpdateDescriptorSets(device.context.device, 1, &write, 0, nullptr);
+        });
     const auto start = std::chrono::steady_clock::now();
     VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, uint32_t(job.push_constants.size())};
     RtrRayTracingPipelineCreateInfo info{};
     info.pCode = module.data();
     info.codeSize = module.size() * sizeof(uint32_t);
-    info.setLayoutCount = uint32_t(layouts_.size());
-    info.pSetLayouts = layouts_.data();
+    info.setLayoutCount = uint32_t(descriptors_->layouts.size());
+    info.pSetLayouts = descriptors_->layouts.data();
     info.pushConstantRangeCount = range.size ? 1 : 0;
     info.pPushConstantRanges = &range;
     device.check(rtrCreateRayTracingPipeline(device.handle, VK_NULL_HANDLE, &info, nullptr, &pipeline_),
@@ -44,69 +56,8 @@ RtcLauncher::RtcLauncher(const RtcDevice& device, const RtcScene& scene, const R
 }
 
 RtcLauncher::~RtcLauncher() {
-    const VkDevice device = device_.context.device;
     rtrDestroyRecorder(device_.handle, recorder_, nullptr);
     rtrDestroyPipeline(device_.handle, pipeline_, nullptr);
-    vkDestroyDescriptorPool(device, pool_, nullptr);
-    for (VkDescriptorSetLayout layout : layouts_) vkDestroyDescriptorSetLayout(device, layout, nullptr);
-}
-
-void RtcLauncher::make_descriptors(const RtcScene& scene, const RayTracingJob& job) {
-    const VkDevice device = device_.context.device;
-    auto type_of = [](const JobBinding& binding) {
-        return binding.acceleration_structure ? VK_DESCRIPTOR_TYPE_STORAGE_BUFFER : binding.type;
-    };
-    std::map<VkDescriptorType, uint32_t> counts;
-    uint32_t set_count = 0;
-    for (const JobBinding& binding : job.bindings) {
-        set_count = std::max(set_count, binding.set + 1);
-        counts[type_of(binding)] += binding.count;
-    }
-    if (set_count == 0) return;
-    for (uint32_t set = 0; set < set_count; ++set) {
-        std::vector<VkDescriptorSetLayoutBinding> bindings;
-        for (const JobBinding& binding : job.bindings)
-            if (binding.set == set)
-                bindings.push_back(
-                    {binding.binding, type_of(binding), binding.count, VK_SHADER_STAGE_COMPUTE_BIT, nullptr});
-        VkDescriptorSetLayoutCreateInfo info{};
-        info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO;
-        info.bindingCount = uint32_t(bindings.size());
-        info.pBindings = bindings.data();
-        layouts_.push_back(VK_NULL_HANDLE);
-        tools::check(vkCreateDescriptorSetLayout(device, &info, nullptr, &layouts_.back()),
-                     "vkCreateDescriptorSetLayout");
-    }
-    std::vector<VkDescriptorPoolSize> sizes;
-    for (const auto& [type, count] : counts) sizes.push_back({type, count});
-    VkDescriptorPoolCreateInfo poolInfo{};
-    poolInfo.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
-    poolInfo.maxSets = set_count;
-    poolInfo.poolSizeCount = uint32_t(sizes.size());
-    poolInfo.pPoolSizes = sizes.data();
-    tools::check(vkCreateDescriptorPool(device, &poolInfo, nullptr, &pool_), "vkCreateDescriptorPool");
-    sets_.resize(set_count);
-    VkDescriptorSetAllocateInfo allocate{};
-    allocate.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO;
-    allocate.descriptorPool = pool_;
-    allocate.descriptorSetCount = set_count;
-    allocate.pSetLayouts = layouts_.data();
-    tools::check(vkAllocateDescriptorSets(device, &allocate, sets_.data()), "vkAllocateDescriptorSets");
-
-    for (const JobBinding& binding : job.bindings) {
-        std::vector<VkDescriptorBufferInfo> structures(binding.acceleration_structure ? binding.count : 0);
-        for (VkDescriptorBufferInfo& structure : structures) structure = scene.descriptor();
-        VkWriteDescriptorSet write{};
-        write.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
-        write.dstSet = sets_[binding.set];
-        write.dstBinding = binding.binding;
-        write.descriptorCount = binding.count;
-        write.descriptorType = type_of(binding);
-        write.pBufferInfo = binding.acceleration_structure ? structures.data() : binding.buffers.data();
-        write.pImageInfo = binding.images.data();
-        write.pTexelBufferView = binding.texel_buffers.data();
-        vkUpdateDescriptorSets(device, 1, &write, 0, nullptr);
-    }
 }
 
 void RtcLauncher::make_table(const JobTable& table) {
@@ -150,10 +101,10 @@ void RtcLauncher::record(VkCommandBuffer commands, const std::vector<uint8_t>& p
             device_.check(rtrCmdSetLaunchScratch(recorder_, scratch_.handle, 0, scratch_.size),
                           "rtrCmdSetLaunchScratch");
         device_.check(rtrCmdBindPipeline(recorder_, pipeline_), "rtrCmdBindPipeline");
-        if (!sets_.empty())
-            device_.check(
-                rtrCmdBindDescriptorSets(recorder_, 0, uint32_t(sets_.size()), sets_.data(), 0, nullptr),
-                "rtrCmdBindDescriptorSets");
+        if (!descriptors_->sets.empty())
+            device_.check(rtrCmdBindDescriptorSets(recorder_, 0, uint32_t(descriptors_->sets.size()),
+                                                   descriptors_->sets.data(), 0, nullptr),
+                          "rtrCmdBindDescriptorSets");
         recording_ = commands;
     }
     if (!push_constants.empty())

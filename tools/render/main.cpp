@@ -7,6 +7,10 @@
 #include "error.h"
 #include "image_file.h"
 #include "renderer.h"
+#ifdef RTC_RENDER_NATIVE
+#include "comparison.h"
+#include "native_renderer.h"
+#endif
 
 namespace {
 
@@ -22,7 +26,8 @@ struct Arguments {
     std::string scene = "builtin:cornell", integrator = "path", dialect = "nv", device, output, demo_folder;
     std::vector<float> eye, target;
     float field_of_view = 0, exposure = 1;
-    bool validate = false, demo = false;
+    std::string native;
+    bool validate = false, demo = false, compare = false;
     RenderOptions render;
 };
 
@@ -33,7 +38,56 @@ void set_camera(const Arguments& arguments, Camera& camera) {
     if (arguments.field_of_view > 0) camera.fov_y = glm::radians(arguments.field_of_view);
 }
 
+void save(const Arguments& arguments, RenderResult& result) {
+    if (arguments.output.empty()) return;
+    for (size_t i = 0; i < result.picture.pixels.size(); ++i)
+        if (i % 4 != 3) result.picture.pixels[i] *= arguments.exposure;
+    write_picture(arguments.output, result.picture);
+    std::printf("wrote %s (compile %.2f s, build %.2f s, trace %.2f s)\n", arguments.output.c_str(),
+                result.compile_seconds, result.build_seconds, result.trace_seconds);
+}
+
+Scene scene_of(const Arguments& arguments) {
+    Scene scene = load_scene(arguments.scene);
+    set_camera(arguments, scene.camera);
+    return scene;
+}
+
+#ifdef RTC_RENDER_NATIVE
+// The device's own ray tracing alone, or beside rtc on the same device with the same shaders.
+int draw_natively(Arguments& arguments) {
+    const bool khr = arguments.native == "khr";
+    native::Requirements needs(khr ? native::Requirements::Kind::Khr : native::Requirements::Kind::Nv);
+    ContextOptions options;
+    options.device = arguments.device;
+    options.validate = arguments.validate;
+    needs.apply(options);
+    Context context(options);
+    const Scene scene = scene_of(arguments);
+    RenderOptions& render_options = arguments.render;
+    render_options.settings.ext_dialect = khr;
+    render_options.keep_gbuffer = arguments.compare;
+    RenderResult peer = render_natively(context, scene, render_options);
+    bool passed = true;
+    if (arguments.compare) {
+        RtcDevice device(context);
+        RenderResult ours = render(device, scene, render_options);
+        const Comparison comparison = compare(peer, ours);
+        std::printf("%s", as_text(comparison).c_str());
+        passed = comparison.passed();
+        save(arguments, ours);
+    } else {
+        save(arguments, peer);
+    }
+    context.require_silent_validation();
+    return passed ? 0 : 1;
+}
+#else
+int draw_natively(Arguments&) { throw Error("this build has no native executors"); }
+#endif
+
 int draw(Arguments& arguments) {
+    if (!arguments.native.empty()) return draw_natively(arguments);
     ContextOptions options;
     options.device = arguments.device;
     options.validate = arguments.validate;
@@ -43,16 +97,8 @@ int draw(Arguments& arguments) {
         if (arguments.demo) {
             draw_demo(device, arguments.demo_folder, arguments.render);
         } else {
-            Scene scene = load_scene(arguments.scene);
-            set_camera(arguments, scene.camera);
-            arguments.render.settings.integrator = integrator_from_name(arguments.integrator);
-            arguments.render.settings.ext_dialect = arguments.dialect == "ext";
-            RenderResult result = render(device, scene, arguments.render);
-            for (size_t i = 0; i < result.picture.pixels.size(); ++i)
-                if (i % 4 != 3) result.picture.pixels[i] *= arguments.exposure;
-            write_picture(arguments.output, result.picture);
-            std::printf("wrote %s (compile %.2f s, build %.2f s, trace %.2f s)\n", arguments.output.c_str(),
-                        result.compile_seconds, result.build_seconds, result.trace_seconds);
+            RenderResult result = render(device, scene_of(arguments), arguments.render);
+            save(arguments, result);
         }
     }
     context.require_silent_validation();
@@ -99,12 +145,19 @@ int main(int argc, char** argv) {
     app.add_flag("--fast-build", render.fast_build, "prefer build speed to trace speed");
     app.add_flag("!--no-optimize", render.optimize, "compile without -O");
     app.add_flag("--quiet", render.quiet, "no progress");
+    app.add_option("--native", arguments.native, "draw with the device's own extension: nv or khr")
+        ->check(CLI::IsMember({"nv", "khr"}));
+    app.add_flag("--compare", arguments.compare, "with --native: draw with rtc too and compare");
     app.add_flag("--demo", arguments.demo, "draw the three demo pictures");
     app.add_option("--out-dir", arguments.demo_folder, "where --demo writes")->default_str("out/demo");
     CLI11_PARSE(app, argc, argv);
     if (arguments.demo_folder.empty()) arguments.demo_folder = "out/demo";
     return run_program("rtc-render", [&] {
-        if (arguments.output.empty() && !arguments.demo) throw Error("-o FILE or --demo is needed");
+        if (arguments.output.empty() && !arguments.demo && !arguments.compare)
+            throw Error("-o FILE, --compare or --demo is needed");
+        if (arguments.compare && arguments.native.empty()) throw Error("--compare needs --native=nv or khr");
+        render.settings.integrator = integrator_from_name(arguments.integrator);
+        render.settings.ext_dialect = arguments.dialect == "ext";
         return draw(arguments);
     });
 }

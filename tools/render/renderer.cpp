@@ -99,6 +99,7 @@ RenderResult render(const RtcDevice& device, const Scene& scene, const RenderOpt
     result.rays = job.rays(context);
     progress.finish(result.rays);
     result.picture = job.picture(context, options.samples);
+    if (options.keep_gbuffer) result.gbuffer = download_image(context, job.gbuffer);
     return result;
 }
 

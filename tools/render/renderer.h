@@ -17,12 +17,14 @@ struct RenderOptions {
     bool fast_build = false;
     bool quiet = false;
     bool optimize = true;
+    bool keep_gbuffer = false;         // fill RenderResult::gbuffer
     std::vector<std::string> modules;  // precompiled, one a pass; empty: compile the shaders
     std::string save_modules;          // folder for what was compiled; empty: nowhere
 };
 
 struct RenderResult {
     Picture picture;
+    std::vector<uint8_t> gbuffer;  // four words a pixel: the last sample's first hits
     double rays = 0, trace_seconds = 0, compile_seconds = 0, build_seconds = 0;
 };
 
