@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <limits>
 
 #include "error.h"
@@ -222,8 +223,11 @@ void measure_cost(DeviceTracer& tracer, uint64_t rays, std::vector<CostRow>& row
         }
         CostRow row{coherent ? "primary" : "random", knot.triangles.size(), batch.size()};
         row.seconds = std::numeric_limits<double>::infinity();
-        for (int repeat = 0; repeat < 3; ++repeat) {
+        row.cpu_seconds = row.seconds;
+        for (int repeat = 0; repeat < 7; ++repeat) {
+            const std::clock_t before = std::clock();
             const auto results = tracer.trace(batch);
+            row.cpu_seconds = std::min(row.cpu_seconds, double(std::clock() - before) / CLOCKS_PER_SEC);
             row.seconds = std::min(row.seconds, tracer.seconds);
             uint64_t turns = 0;
             for (const RayResult& r : results) turns += r.turns;

@@ -34,6 +34,7 @@ struct CostRow {
     std::string workload;
     uint64_t triangles = 0, rays = 0;
     double seconds = 0, turns_per_ray = 0;
+    double cpu_seconds = 0;  // of this process: the steadier figure for devices that are the CPU
     double mrays() const { return seconds > 0 ? double(rays) / seconds / 1e6 : 0; }
 };
 

@@ -25,10 +25,12 @@ std::string markdown(const Report& report, const std::string& device) {
     char line[512];
     out << "## " << variant_name(report.variant) << " on " << device << "\n\n";
     if (!report.cost.empty()) {
-        out << "| workload | triangles | rays | Mrays/s | turns per ray |\n|---|---|---|---|---|\n";
+        out << "| workload | triangles | rays | Mrays/s | Mrays per CPU second | turns per ray |\n"
+            << "|---|---|---|---|---|---|\n";
         for (const CostRow& r : report.cost) {
-            std::snprintf(line, sizeof line, "| %s | %llu | %llu | %.3f | %.1f |\n", r.workload.c_str(),
-                          (unsigned long long)r.triangles, (unsigned long long)r.rays, r.mrays(), r.turns_per_ray);
+            std::snprintf(line, sizeof line, "| %s | %llu | %llu | %.3f | %.3f | %.1f |\n", r.workload.c_str(),
+                          (unsigned long long)r.triangles, (unsigned long long)r.rays, r.mrays(),
+                          double(r.rays) / r.cpu_seconds / 1e6, r.turns_per_ray);
             out << line;
         }
         out << '\n';
@@ -68,7 +70,7 @@ nlohmann::ordered_json to_json(const Report& report) {
     json["tier"] = variant_name(report.variant);
     for (const CostRow& r : report.cost) {
         json["cost"].push_back({{"workload", r.workload}, {"triangles", r.triangles}, {"rays", r.rays},
-                                {"mrays_per_second", r.mrays()}, {"turns_per_ray", r.turns_per_ray}});
+                                {"mrays_per_second", r.mrays()}, {"cpu_seconds", r.cpu_seconds}, {"turns_per_ray", r.turns_per_ray}});
     }
     for (const LeakRow& r : report.leaks) {
         json["leaks"].push_back({{"axis", r.axis}, {"value", r.value}, {"mesh", r.mesh}, {"aim", r.aim},

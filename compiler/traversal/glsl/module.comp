@@ -1,5 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+// A texel buffer without a sampler: SPIR-V 1.6 knows no sampled image of a buffer.
+#extension GL_EXT_samplerless_texture_functions : require
 #include "traversal.glsl"
 
 // Never linked: names every export, so that none is dropped.

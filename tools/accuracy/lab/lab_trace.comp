@@ -1,5 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+// A texel buffer without a sampler: SPIR-V 1.6 knows no sampled image of a buffer.
+#extension GL_EXT_samplerless_texture_functions : require
 // Traversal alone: one lane traces one ray from a buffer and writes what it
 // found. The any-hit and intersection shaders are modes below.
 #include "traversal.glsl"
