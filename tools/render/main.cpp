@@ -57,7 +57,8 @@ Scene scene_of(const Arguments& arguments) {
 // The device's own ray tracing alone, or beside rtc on the same device with the same shaders.
 int draw_natively(Arguments& arguments) {
     const bool khr = arguments.native == "khr";
-    native::Requirements needs(khr ? native::Requirements::Kind::Khr : native::Requirements::Kind::Nv);
+    rtc::native::Requirements needs(khr ? rtc::native::Requirements::Kind::Khr
+                                        : rtc::native::Requirements::Kind::Nv);
     ContextOptions options;
     options.device = arguments.device;
     options.validate = arguments.validate;
