@@ -68,8 +68,8 @@ struct LinkOptions {
     bool debug_info = false;            // -g: keep OpLine, OpName, OpSource
     bool validate = true;               // run spirv-val on the result
     bool resumable = true;              // lanes can suspend (see docs/resumable.md)
-    uint32_t max_recursion_depth = 1;   // trace calls nested in trace calls, 1..31
-    uint32_t max_callable_depth = 0;    // 0: from the call graph
+    uint32_t max_recursion_depth = 0;   // trace calls nested in trace calls, 1..31; 0: 1, or 31 when hit or miss shaders trace
+    uint32_t max_callable_depth = 0;    // 1..31; 0: 31
     int32_t reserved_set = -1;          // -1: highest used + 1
     uint32_t reserved_binding = 0;
     std::string stop_after;             // for tests: name of the pass after which to print and stop

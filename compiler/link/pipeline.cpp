@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <set>
 
+#include "check/check.h"
 #include "continuation/machine.h"
 #include "link/link.h"
 #include "lower/stage.h"
@@ -38,10 +39,13 @@ class Linker {
         check_input();
         machine_.entry_count = static_cast<uint32_t>(input_.stages.size());
         machine_.next_state_id = continuation::kFirstEntry + machine_.entry_count;
+        // All stages are read before the first is lowered: how deep calls can nest decides about stacks.
+        for (const StageInput& stage : input_.stages) modules_.push_back(ir::read_module(stage.spirv, stage.file));
         set_depths();
         import_traversal();
         std::map<uint32_t, uint32_t> spec_ids;
         for (size_t i = 0; i < input_.stages.size(); ++i) add_stage(static_cast<uint32_t>(i), spec_ids);
+        check::check_data_types(program_, data_types_, result_.diagnostics);
         if (options_.stop_after == "split") {
             dump_states();
             return;
@@ -93,7 +97,14 @@ class Linker {
     }
 
     void set_depths() {
-        machine_.max_depth = std::max(1u, options_.max_recursion_depth);
+        bool nested = false;
+        for (size_t i = 0; i < modules_.size(); ++i)
+            if (input_.stages[i].kind != StageKind::RayGen)
+                for (const ir::Function& function : modules_[i].functions)
+                    for (const ir::Block& block : function.blocks)
+                        for (const Inst& inst : block.insts)
+                            nested |= inst.op == Op::OpTraceNV || inst.op == Op::OpTraceRayKHR;
+        machine_.max_depth = options_.max_recursion_depth ? options_.max_recursion_depth : nested ? 31 : 1;
         machine_.max_callable_depth = options_.max_callable_depth ? options_.max_callable_depth : 31;
     }
 
@@ -110,7 +121,7 @@ class Linker {
 
     void add_stage(uint32_t index, std::map<uint32_t, uint32_t>& spec_ids) {
         const StageInput& stage_input = input_.stages[index];
-        ir::Module module = ir::read_module(stage_input.spirv, stage_input.file);
+        ir::Module& module = modules_[index];
         if (options_.validate) {
             std::vector<uint32_t> words = ir::write_module(module, false);
             const std::string problem = link::validate(words, 3, true);
@@ -146,6 +157,8 @@ class Linker {
         lower::select_entry(program_, stage, std::move(functions), map.at(entry_function));
         // NV's exits and locations first: nothing later may see code after an ignore.
         lower::normalize_calls(program_, stage);
+        check::check_stage(program_, stage, input_, result_.diagnostics);
+        check::collect_data_types(program_, stage, data_types_);
         // Inlining before interface lowering: pointers to payloads and acceleration structures
         // that were passed to functions become plain variables and chains.
         lower::inline_calls(program_, stage, kinds_);
@@ -297,6 +310,8 @@ class Linker {
     Program program_;
     Machine machine_;
     lower::CallKinds kinds_;
+    check::DataTypes data_types_;
+    std::vector<ir::Module> modules_;
     link::ResourceTable resources_;
     std::vector<ir::Function> helpers_;
     Id main_ = 0;
