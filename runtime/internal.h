@@ -81,7 +81,9 @@ bool rtr_load_device_table(const RtrInstanceTable* instance, VkDevice device, Rt
     X(encode_nodes)     \
     X(encode_triangles) \
     X(encode_aabbs)     \
-    X(header)
+    X(header)           \
+    X(finish_launch)    \
+    X(probe)
 
 typedef enum RtrKernel {
 #define X(name) RTR_KERNEL_##name,

@@ -1,0 +1,128 @@
+/* Launch errors and the float probe: turning words the device wrote into answers. */
+#include <stdio.h>
+
+#include "internal.h"
+
+uint32_t rtrGetLaunchCount(RtrRecorder r) { return r->launch_count; }
+
+VkResult rtrGetLaunchErrorLocation(RtrRecorder r, uint32_t index, VkDescriptorBufferInfo* info) {
+    if (index >= r->launch_count)
+        return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "launch-index", "launch %u of %u", index, r->launch_count);
+    info->buffer = r->control;
+    info->offset = r->launches[index].offset;
+    info->range = r->launches[index].size;
+    return VK_SUCCESS;
+}
+
+VkResult rtrDecodeLaunchError(const uint32_t* words, RtrLaunchError* e) {
+    e->code = words[RTC_CTRL_ERROR];
+    e->count = words[RTC_CTRL_ERROR_COUNT];
+    memcpy(e->launchId, words + RTC_CTRL_ERROR_LANE, sizeof e->launchId);
+    e->detail[0] = words[RTC_CTRL_ERROR_DETAIL];
+    e->detail[1] = words[RTC_CTRL_ERROR_DETAIL2];
+    e->suspendedLanes = words[RTC_CTRL_SUSPENDED];
+    return e->code == RTC_LAUNCH_ERROR_NONE ? VK_SUCCESS : VK_ERROR_UNKNOWN;
+}
+
+void rtrFormatLaunchError(const RtrLaunchError* e, char* text, size_t size) {
+    char what[160];
+    switch (e->code) {
+        case RTC_LAUNCH_ERROR_NONE: snprintf(what, sizeof what, "no error"); break;
+        case RTC_LAUNCH_ERROR_RECURSION_DEPTH:
+            snprintf(what, sizeof what, "a trace below the pipeline's recursion limit was dropped (rtc --max-recursion-depth)");
+            break;
+        case RTC_LAUNCH_ERROR_CALLABLE_DEPTH:
+            snprintf(what, sizeof what, "a callable below the pipeline's depth limit was dropped (rtc --max-callable-depth)");
+            break;
+        case RTC_LAUNCH_ERROR_BAD_HANDLE:
+            snprintf(what, sizeof what, "an SBT record holds no shader of this pipeline (word read: 0x%08x)", e->detail[0]);
+            break;
+        case RTC_LAUNCH_ERROR_ABI:
+            snprintf(what, sizeof what, "an acceleration structure is not of this ABI version, or no structure (word read: 0x%08x)",
+                     e->detail[0]);
+            break;
+        case RTC_LAUNCH_ERROR_ASSUMPTION:
+            snprintf(what, sizeof what, "the scene breaks an assumption the module was compiled with (fact 0x%x, first offender %u)",
+                     e->detail[0], e->detail[1]);
+            break;
+        case RTC_LAUNCH_ERROR_UNFINISHED:
+            snprintf(what, sizeof what, "up to %u lanes were not finished when the rounds ran out (rtrCmdSetLaunchLimits)",
+                     e->detail[0]);
+            break;
+        case RTC_LAUNCH_ERROR_STACK: snprintf(what, sizeof what, "a traversal or word stack overflowed (internal)"); break;
+        default: snprintf(what, sizeof what, "unknown launch error %u", e->code); break;
+    }
+    if (e->code == RTC_LAUNCH_ERROR_NONE || e->code == RTC_LAUNCH_ERROR_UNFINISHED) {
+        snprintf(text, size, "%s", what);
+    } else {
+        snprintf(text, size, "%s; %u events, the first at launch id (%u, %u, %u)", what, e->count, e->launchId[0],
+                 e->launchId[1], e->launchId[2]);
+    }
+}
+
+VkResult rtrGetLaunchError(RtrRecorder r, uint32_t index, const void* mapped, RtrLaunchError* e) {
+    VkDescriptorBufferInfo info = {VK_NULL_HANDLE, 0, 0};
+    uint32_t words[RTR_LAUNCH_ERROR_BYTES / 4];
+    VkResult result = rtrGetLaunchErrorLocation(r, index, &info);
+    if (result != VK_SUCCESS) return result;
+    memcpy(words, (const char*)mapped + info.offset, sizeof words);
+    result = rtrDecodeLaunchError(words, e);
+    if (result != VK_SUCCESS) {
+        char text[384];
+        rtrFormatLaunchError(e, text, sizeof text);
+        rtr_error(r->device, result, "launch-error", "launch %u: %s", index, text);
+    }
+    return result;
+}
+
+static uint32_t float_bits(float f) {
+    uint32_t u;
+    memcpy(&u, &f, sizeof u);
+    return u;
+}
+
+VkResult rtrCmdProbeFloat(RtrRecorder r, VkBuffer dstBuffer, VkDeviceSize dstOffset) {
+    RtrDevice d = r->device;
+    struct RtrBuildPush push;
+    VkDescriptorBufferInfo info;
+    VkWriteDescriptorSet write = {.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET};
+    VkResult result;
+    if (!r->cmd || dstOffset % 256)
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "probe", "rtrCmdProbeFloat: begin the recorder; dstOffset a multiple of 256");
+    if ((result = rtr_allocate_set(r, d->array_layout, &write.dstSet)) != VK_SUCCESS) return result;
+    info.buffer = dstBuffer;
+    info.offset = dstOffset;
+    info.range = RTR_FLOAT_PROBE_BYTES;
+    write.dstBinding = RTR_ARR_STATE;
+    write.descriptorCount = 1;
+    write.descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+    write.pBufferInfo = &info;
+    d->vk.UpdateDescriptorSets(d->device, 1, &write, 0, NULL);
+    memset(&push, 0, sizeof push);
+    push.count = float_bits(1.0f + 1.0f / 4096);
+    push.total = float_bits(-(1.0f + 2.0f / 4096));
+    push.first = 0x00800000u; /* smallest normal */
+    push.primitive_base = float_bits(0.5f);
+    push.geometry = float_bits(3.0f);
+    push.data_offset = 0x7fc00000u;
+    push.data_stride = float_bits(1.0f / 16777216);
+    d->vk.CmdBindPipeline(r->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, d->kernels[RTR_KERNEL_probe]);
+    d->vk.CmdBindDescriptorSets(r->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, d->kernel_layout, 1, 1, &write.dstSet, 0, NULL);
+    d->vk.CmdPushConstants(r->cmd, d->kernel_layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof push, &push);
+    d->vk.CmdDispatch(r->cmd, 1, 1, 1);
+    return VK_SUCCESS;
+}
+
+void rtrDecodeFloatProbe(const void* data, RtrFloatProbe* p) {
+    uint32_t w[RTR_FLOAT_PROBE_BYTES / 4];
+    memcpy(w, data, sizeof w);
+    /* (1 + 2^-12)^2 - (1 + 2^-11) is 2^-24 exactly; the rounded square is 1 + 2^-11. */
+    p->contractsUnmarked = (w[0] & 0x7fffffffu) != 0;
+    p->contractsPrecise = (w[1] & 0x7fffffffu) != 0;
+    p->fmaIsFused = (w[2] & 0x7fffffffu) != 0;
+    p->flushesDenormals = (w[3] & 0x7fffffffu) == 0;
+    p->roundsToNearestEven = w[4] == 0x3f800000u && w[5] == 0x3f800002u;
+    p->exactDivision = w[6] == float_bits(1.0f / 3.0f) && w[7] == float_bits(1.0f / 7.0f);
+    p->keepsSignedZero = w[8] == 0x80000000u;
+    p->nanFailsComparison = w[9] == 0;
+}
