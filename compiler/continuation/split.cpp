@@ -634,6 +634,8 @@ class Splitter {
         for (uint32_t i = 0; i < words.size(); ++i) e.store(m_.payload_word(i), words[i]);
         const std::vector<Id> ops(inst.ops.begin(), inst.ops.end());
         auto masked = [&](Id value, uint32_t mask) {
+            uint64_t constant = 0;
+            if (p_.constant_value(value, constant)) return p_.constant_u32(static_cast<uint32_t>(constant) & mask);
             return e.value(Op::OpBitwiseAnd, u32, {as_uint(e, value), p_.constant_u32(mask)});
         };
         m_.store(e, "rtc_ray_root", ops[0]);

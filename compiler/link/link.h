@@ -21,6 +21,7 @@ void specialize(ir::Module& module, const StageInput& stage, std::map<uint32_t, 
 struct ResourceTable {
     std::map<std::vector<uint32_t>, Id> variables;
     std::map<std::pair<uint32_t, uint32_t>, std::pair<std::string, std::string>> kinds;  // (set, binding) -> kind, stage
+    std::map<std::pair<uint32_t, uint32_t>, Id> first;  // the first variable at (set, binding)
     Id push_constants = 0;
     std::string push_constants_stage;
 };

@@ -129,7 +129,12 @@ void unify_resources(Program& p, lower::Stage& stage, ResourceTable& table, Refl
             replaced[id] = known;
         } else {
             known = id;
-            if (!fresh) p.decorate(id, spv::Decoration::Aliased);
+            // Several variables onto one resource: writes through one are seen through the other.
+            const auto [first, alone] = table.first.emplace(std::make_pair(set, binding), id);
+            if (!alone)
+                for (Id variable : {first->second, id})
+                    if (!p.decoration(variable, spv::Decoration::Aliased))
+                        p.decorate(variable, spv::Decoration::Aliased);
             ResourceReport report;
             report.name = p.module.name_of(id);
             report.stage = stage.name;
