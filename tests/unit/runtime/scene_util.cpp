@@ -28,7 +28,7 @@ Scene::~Scene() {
 
 Buffer Scene::upload(const void* data, size_t size) {
     Buffer b = vk.buffer(size ? size : 4, RTR_INPUT_BUFFER_USAGE);
-    if (size) memcpy(b.data, data, size);
+    if (data && size) memcpy(b.data, data, size);
     buffers_.push_back(b);
     return b;
 }
