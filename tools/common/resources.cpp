@@ -265,7 +265,10 @@ std::vector<uint8_t> download_image(const Context& context, const Image& image) 
     context.run([&](VkCommandBuffer commands) {
         full_barrier(commands);
         const VkBufferImageCopy copy = whole_image(image.desc);
-        vkCmdCopyImageToBuffer(commands, image.handle, VK_IMAGE_LAYOUT_GENERAL, staging.handle, 1, &copy);
+        transition(commands, image, VK_IMAGE_LAYOUT_GENERAL, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL);
+        vkCmdCopyImageToBuffer(commands, image.handle, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, staging.handle,
+                               1, &copy);
+        transition(commands, image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, VK_IMAGE_LAYOUT_GENERAL);
         full_barrier(commands);
     });
     std::vector<uint8_t> texels(image_bytes(image.desc));
@@ -283,7 +286,10 @@ void upload_image(const Context& context, const Image& image, std::span<const ui
     context.run([&](VkCommandBuffer commands) {
         full_barrier(commands);
         const VkBufferImageCopy copy = whole_image(image.desc);
-        vkCmdCopyBufferToImage(commands, staging.handle, image.handle, VK_IMAGE_LAYOUT_GENERAL, 1, &copy);
+        transition(commands, image, VK_IMAGE_LAYOUT_GENERAL, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
+        vkCmdCopyBufferToImage(commands, staging.handle, image.handle, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
+                               1, &copy);
+        transition(commands, image, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_IMAGE_LAYOUT_GENERAL);
         full_barrier(commands);
     });
 }
