@@ -1,0 +1,122 @@
+// --target-env= -O0 -O -Os -g --max-recursion-depth= --max-callable-depth= --reserved= --no-*.
+#include <nlohmann/json.hpp>
+
+#include "cli_fixture.h"
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+namespace {
+
+class Target : public Cli {
+  protected:
+    std::string module(const std::string& options, const std::string& dialect = "nv") {
+        copy_shaders(dialect);
+        const CliRun run = rtc("camera.rgen sky.rmiss shade.rchit -o out.spv " + options);
+        EXPECT_EQ(run.status, 0) << run.err;
+        return read("out.spv");
+    }
+    nlohmann::json reflection(const std::string& options, const std::string& dialect = "nv") {
+        copy_shaders(dialect);
+        const CliRun run = rtc("camera.rgen sky.rmiss shade.rchit -o out.spv --reflect out.json " + options);
+        EXPECT_EQ(run.status, 0) << run.err;
+        return nlohmann::json::parse(read("out.json"));
+    }
+};
+
+TEST_F(Target, DefaultFollowsTheDialect) {
+    EXPECT_TRUE(is_valid_for(module("", "nv"), "vulkan1.1"));
+    EXPECT_TRUE(is_valid_for(module("", "ext"), "vulkan1.2"));
+    EXPECT_EQ(reflection("", "nv")["spirvVersion"], "1.3");
+}
+
+TEST_F(Target, TargetEnvIsIndependentOfTheInput) {
+    EXPECT_TRUE(is_valid_for(module("--target-env=vulkan1.1", "ext"), "vulkan1.1"));
+    EXPECT_TRUE(is_valid_for(module("--target-env=vulkan1.2", "nv"), "vulkan1.2"));
+    EXPECT_TRUE(is_valid_for(module("--target-env vulkan1.3", "nv"), "vulkan1.3"));
+}
+
+TEST_F(Target, TargetEnvRefusesOthers) {
+    copy_shaders("nv");
+    for (const char* bad : {"vulkan1.0", "vulkan", "opengl", "1.1", ""}) {
+        const CliRun run = rtc("camera.rgen --target-env=" + std::string(bad));
+        EXPECT_EQ(run.status, 2) << bad;
+        EXPECT_THAT(run.err, HasSubstr("expected vulkan1.1, vulkan1.2 or vulkan1.3"));
+    }
+}
+
+TEST_F(Target, DashO0IsTheDefault) { EXPECT_EQ(module("-O0"), module("")); }
+
+TEST_F(Target, DashOMakesADifferentValidModule) {
+    const std::string plain = module("");
+    const std::string fast = module("-O");
+    EXPECT_NE(fast, plain);
+    EXPECT_TRUE(is_valid_for(fast, "vulkan1.1"));
+}
+
+TEST_F(Target, DashOsMakesASmallerModule) {
+    const std::string small = module("-Os");
+    EXPECT_LT(small.size(), module("").size());
+    EXPECT_TRUE(is_valid_for(small, "vulkan1.1"));
+}
+
+TEST_F(Target, TheLastOptimisationLevelWins) { EXPECT_EQ(module("-O -Os -O0"), module("-O0")); }
+
+TEST_F(Target, DashGKeepsLinesAndNamesAsGiven) {
+    copy_shaders("nv", "src");
+    ASSERT_EQ(rtc("-g src/camera.rgen src/sky.rmiss -o out.spv").status, 0);
+    const std::string text = disassembled(read("out.spv"));
+    EXPECT_THAT(text, HasSubstr("OpLine"));
+    EXPECT_THAT(text, HasSubstr("\"src/camera.rgen\""));
+    EXPECT_TRUE(is_valid_for(read("out.spv"), "vulkan1.1"));
+}
+
+TEST_F(Target, WithoutDashGThereIsNoSource) {
+    const std::string text = disassembled(module(""));
+    EXPECT_THAT(text, Not(HasSubstr("OpLine")));
+    EXPECT_THAT(text, Not(HasSubstr("OpSource ")));
+    EXPECT_THAT(text, Not(HasSubstr("rayPayloadInNV")));
+}
+
+TEST_F(Target, MaxRecursionDepth) {
+    EXPECT_EQ(reflection("")["maxRecursionDepth"], 1);
+    EXPECT_EQ(reflection("--max-recursion-depth=5")["maxRecursionDepth"], 5);
+    for (const char* bad : {"0", "32", "-1", "two", ""}) {
+        const CliRun run = rtc("camera.rgen --max-recursion-depth=" + std::string(bad));
+        EXPECT_EQ(run.status, 2) << bad;
+        EXPECT_THAT(run.err, HasSubstr("expected 1 to 31"));
+    }
+}
+
+TEST_F(Target, MaxCallableDepth) {
+    EXPECT_EQ(module("--max-callable-depth=3").empty(), false);
+    EXPECT_EQ(rtc("camera.rgen --max-callable-depth=32").status, 2);
+    EXPECT_EQ(rtc("camera.rgen --max-callable-depth=x").status, 2);
+}
+
+TEST_F(Target, ReservedSetAndBinding) {
+    EXPECT_EQ(reflection("")["reserved"]["set"], 1) << "one above the highest used";
+    EXPECT_EQ(reflection("--reserved=3")["reserved"]["set"], 3);
+    const auto shared = reflection("--reserved=0.20")["reserved"];
+    EXPECT_EQ(shared["set"], 0);
+    EXPECT_EQ(shared["binding"], 20);
+    EXPECT_THAT(disassembled(read("out.spv")), HasSubstr("Binding 20"));
+}
+
+TEST_F(Target, ReservedMistakes) {
+    copy_shaders("nv");
+    for (const char* bad : {"", "x", "1.", ".2", "1.2.3", "-1"}) {
+        const CliRun run = rtc("camera.rgen --reserved=" + std::string(bad));
+        EXPECT_EQ(run.status, 2) << bad;
+        EXPECT_THAT(run.err, HasSubstr("expected SET or SET.BINDING"));
+    }
+}
+
+TEST_F(Target, NoResumable) {
+    EXPECT_THAT(reflection("")["flags"].dump(), HasSubstr("resumable"));
+    EXPECT_THAT(reflection("--no-resumable")["flags"].dump(), Not(HasSubstr("resumable")));
+}
+
+TEST_F(Target, NoValidateGivesTheSameModule) { EXPECT_EQ(module("--no-validate"), module("")); }
+
+}  // namespace
