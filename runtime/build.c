@@ -145,6 +145,40 @@ static void lbvh(RtrBuild* b) {
     rtr_dispatch(b, RTR_KERNEL_number, b->push.blocks);
 }
 
+/* Iterations by search and by force until RTR_PLOC_FINAL clusters are left for certain, and
+ * searching iterations of the last kernel; together with its 8 forced ones they bound the
+ * depth of the tree, see kernels/ploc.glsl. */
+static void ploc_plan(uint32_t n, uint32_t* searched, uint32_t* forced, uint32_t* last) {
+    uint32_t count = n;
+    *searched = *forced = 0;
+    /* Scenes shrink by a third and more in an iteration; two more for those that do not. */
+    for (; count > RTR_PLOC_FINAL; count = (uint32_t)((uint64_t)count * 17 / 25)) ++*searched;
+    if (*searched) *searched += 2;
+    for (count = n; count > RTR_PLOC_FINAL; count = count / 2 + count % 2) ++*forced;
+    *last = RTR_PLOC_MAX_ITERATIONS - 8 - *searched - *forced;
+    if (*last > 24) *last = 24;
+}
+
+static void ploc(RtrBuild* b) {
+    uint32_t searched, forced, last, it;
+    ploc_plan(b->primitives, &searched, &forced, &last);
+    rtr_dispatch(b, RTR_KERNEL_ploc_init, rtr_groups(b->primitives, RTR_GROUP));
+    for (it = 0; it < searched + forced; it++) {
+        b->push.step = it;
+        b->push.blocks = it >= searched;
+        rtr_dispatch_indirect(b, RTR_KERNEL_ploc_search, RTR_ST_ITER + it * RTR_ITER_WORDS);
+        rtr_dispatch(b, RTR_KERNEL_ploc_scan, 1);
+        rtr_dispatch_indirect(b, RTR_KERNEL_ploc_merge, RTR_ST_ITER + it * RTR_ITER_WORDS);
+    }
+    b->push.step = it;
+    b->push.blocks = last;
+    rtr_dispatch(b, RTR_KERNEL_ploc_final, 1);
+    while (it-- > 0) {
+        b->push.step = it;
+        rtr_dispatch_indirect(b, RTR_KERNEL_ploc_down, RTR_ST_LEVEL + 4 * it);
+    }
+}
+
 static VkResult record_build(RtrBuild* b) {
     uint32_t groups = rtr_groups(b->primitives, RTR_GROUP), at;
     VkResult r = rtr_bind_arrays(b, 0, 0);
@@ -154,7 +188,11 @@ static VkResult record_build(RtrBuild* b) {
     if (b->primitives) {
         rtr_dispatch(b, RTR_KERNEL_morton, groups);
         sort(b);
-        lbvh(b);
+        if (b->push.flags & RTR_BUILD_PLOC) {
+            ploc(b);
+        } else {
+            lbvh(b);
+        }
     }
     for (at = 0; at < rtr_node_room(b->primitives); at += b->node_window) {
         if ((r = rtr_bind_arrays(b, at, 0)) != VK_SUCCESS) return r;
@@ -269,6 +307,7 @@ VkResult rtrCmdBuildAccelerationStructure(RtrRecorder recorder, const VkAccelera
     b.push.geometry_count = info->geometryCount;
     if (dst->type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV) b.push.flags |= RTR_BUILD_TOP;
     if (dst->aabbs) b.push.flags |= RTR_BUILD_AABBS;
+    if (!(info->flags & VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_BUILD_BIT_NV)) b.push.flags |= RTR_BUILD_PLOC;
     if (info->flags & VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV) b.push.flags |= RTR_BUILD_KEEP_DEGENERATE;
     for (g = 0; g < info->geometryCount; g++) opaque = opaque && (info->pGeometries[g].flags & VK_GEOMETRY_OPAQUE_BIT_NV);
     b.push.facts = (dst->aabbs ? RTC_FACT_AABBS : 0u) | (opaque ? RTC_FACT_ALL_OPAQUE : 0u);
