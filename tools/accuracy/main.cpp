@@ -37,12 +37,12 @@ std::string markdown(const Report& report, const std::string& device) {
     }
     if (!report.leaks.empty()) {
         out << "Leaks and double hits: rays whose entries and exits do not balance.\n\n"
-            << "| axis | value | mesh | aimed at | rays | unbalanced | rate, 95 % bound | promised |\n"
-            << "|---|---|---|---|---|---|---|---|\n";
+            << "| axis | value | mesh | aimed at | rays | no candidate | unbalanced | rate, 95 % bound | promised |\n"
+            << "|---|---|---|---|---|---|---|---|---|\n";
         for (const LeakRow& r : report.leaks) {
-            std::snprintf(line, sizeof line, "| %s | %s | %s | %s | %llu | %llu | < %.2g | %s |\n", r.axis.c_str(),
+            std::snprintf(line, sizeof line, "| %s | %s | %s | %s | %llu | %llu | %llu | < %.2g | %s |\n", r.axis.c_str(),
                           r.value.c_str(), r.mesh.c_str(), r.aim.c_str(), (unsigned long long)r.counts.rays,
-                          (unsigned long long)r.counts.unbalanced, upper_bound(r.counts.unbalanced, r.counts.rays),
+                          (unsigned long long)r.counts.missed, (unsigned long long)r.counts.unbalanced, upper_bound(r.counts.unbalanced, r.counts.rays),
                           r.must_be_zero ? "0" : "");
             out << line;
         }
