@@ -49,14 +49,14 @@
 #define RTR_ST_HAS 9u      /* RTC_FACT_HAS_* */
 #define RTR_ST_NODES 10u   /* encoded nodes */
 #define RTR_ST_ROOT 11u    /* inner node that is the root */
-#define RTR_ST_ITER 64u    /* PLOC: RTR_ITER_WORDS words per iteration, up to 64 iterations and one */
+#define RTR_ST_ITER 64u    /* PLOC: RTR_ITER_WORDS words per iteration, up to 104 of them */
 #define RTR_ITER_WORDS 8u
 #define RTR_ITER_ARGS 0u   /* groups x, y, z of search and merge */
 #define RTR_ITER_COUNT 3u  /* clusters */
 #define RTR_ITER_PARITY 4u /* which cluster list */
 #define RTR_ITER_NODES 5u  /* inner nodes made before this iteration */
-#define RTR_ST_LEVEL 640u  /* PLOC: 4 words per iteration: dispatch args of its top-down pass */
-#define RTR_ST_SUMS 1024u  /* block sums and histograms start here */
+#define RTR_ST_LEVEL 1024u  /* PLOC: 4 words per iteration: dispatch args of its top-down pass */
+#define RTR_ST_SUMS 1536u  /* block sums and histograms start here */
 
 #define RTR_SORT_ITEMS 8u
 #define RTR_SORT_BLOCK (RTR_GROUP * RTR_SORT_ITEMS)
@@ -67,7 +67,6 @@
 
 #define RTR_PLOC_RADIUS 8u
 #define RTR_PLOC_FINAL RTR_GROUP /* clusters the one-workgroup kernel finishes */
-#define RTR_PLOC_MAX_ITERATIONS 60u
 
 #define RTR_INACTIVE_KEY 0x7fffffffu
 

@@ -1,8 +1,9 @@
 // Parallel locally ordered clustering (Meister and Bittner 2018). Clusters lie in Morton
 // order; each looks RTR_PLOC_RADIUS to both sides for the one whose union with it has the
-// least area; two that choose each other merge. One iteration adds at most one level, so
-// the number of iterations bounds the depth: the last ones pair neighbours by force, and
-// the whole never exceeds RTC_MAX_DEPTH whatever the scene.
+// least area; two that choose each other merge. Scenes that would grow chains do not: a
+// merge by choice is refused above p.window_count encoded levels, and what is left when
+// the iterations run out is paired by force, in log2(count) levels. The host sets the
+// limit to RTC_MAX_DEPTH - log2(count).
 //
 // Ties: the key is (area, i xor j), which is the same seen from both ends and different
 // for every j, so the least key of all is always mutual: each iteration merges something,
@@ -21,3 +22,9 @@ void write_args(uint at, uint groups) {
 
 uint groups_of(uint lanes) { return (lanes + RTR_GROUP - 1u) / RTR_GROUP; }
 uint iteration_groups(uint count) { return count > RTR_PLOC_FINAL ? groups_of(count) : 0u; }
+
+uint cluster_height(uint id) {
+    if ((id & RTR_CHILD_LEAF) != 0u) return 0u;
+    return floatBitsToUint(node_box[2u * id + 1u].w) >> RTR_HEIGHT_SHIFT;
+}
+bool low_enough(uint a, uint b) { return max(cluster_height(a), cluster_height(b)) < p.window_count; }

@@ -14,7 +14,7 @@ shared float box_hi[3 * 256];
 shared uint ids[256];
 shared uint nearest[256];
 shared uint sums[256];
-shared uint level[61];
+shared uint level[65];
 
 void main() {
     uint lane = gl_LocalInvocationIndex;
@@ -24,8 +24,9 @@ void main() {
     uint id = 0u;
     if (lane < count) id = links[list + lane];
     uint levels = 0u;
+    bool forced = false;
     // `count` is the same in all lanes: barriers are reached by all or none.
-    while (count > 1u && levels < 60u) {
+    while (count > 1u && levels < 64u) {
         vec3 lo = vec3(0.0), hi = vec3(0.0);
         if (lane < count) {
             if ((id & RTR_CHILD_LEAF) != 0u) {
@@ -44,7 +45,7 @@ void main() {
         barrier();
         uint best = 0xffffffffu;
         if (lane < count) {
-            if (levels >= p.blocks) {
+            if (forced) {
                 best = lane ^ 1u;
             } else {
                 float least = 0.0;
@@ -67,6 +68,7 @@ void main() {
         uint role = ROLE_VANISH;
         if (lane < count) {
             bool mutual = best < count && nearest[best] == lane;
+            if (mutual && !forced) mutual = low_enough(id, ids[best]);
             role = !mutual ? ROLE_STAY : lane < best ? ROLE_LEAD : ROLE_VANISH;
         }
         uint own = (role != ROLE_VANISH ? 1u : 0u) | (role == ROLE_LEAD ? 0x10000u : 0u);
@@ -92,6 +94,7 @@ void main() {
         nodes += total >> 16;
         count = total & 0xffffu;
         levels++;
+        forced = levels >= p.blocks || total >> 16 == 0u;
         memoryBarrierBuffer();
         barrier();
         id = ids[lane];

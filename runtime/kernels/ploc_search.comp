@@ -77,6 +77,7 @@ void main() {
     if (at < count) {
         uint nn = nearest[lane + R];
         bool mutual = nn < count && nearest[nn - uint(base) + R] == at;
+        if (mutual && !forced) mutual = low_enough(links[list + at], links[list + nn]);
         uint role = !mutual ? ROLE_STAY : at < nn ? ROLE_LEAD : ROLE_VANISH;
         marks[at] = (nn & NN_MASK) | (role << ROLE_SHIFT);
         if (role != ROLE_VANISH) atomicAdd(survivors, 1u);
