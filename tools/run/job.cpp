@@ -121,6 +121,7 @@ Job parse_case(const Json& json, const std::string& file) {
         e.values = expect.value("values", Json());
         e.absolute = expect.value("abs", 0.0);
         e.relative = expect.value("rel", 0.0);
+        e.native = text_or(expect, "native", "");
         job.expectations.push_back(std::move(e));
     }
     return job;

@@ -40,6 +40,7 @@ struct Expectation {
     size_t at = 0;         // index of the first value, in units of the type
     Json values;           // a list; null: taken from the native run
     double absolute = 0, relative = 0;
+    std::string native;    // why native drivers are known to differ; "" if they must not
 };
 
 struct Job {

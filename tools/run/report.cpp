@@ -103,6 +103,7 @@ std::vector<CellResult> check_expectations(const Job& job, const RunResult& resu
                 close(as_double(got, scalar), as_double(wanted[i], scalar), expect.absolute, expect.relative))
                 continue;
             cell.passed = false;
+            cell.known = expect.native;
             cell.detail = "value " + std::to_string(expect.at + i) + ": " + show(got, scalar) + ", expected " +
                           show(wanted[i], scalar);
             break;

@@ -11,7 +11,8 @@ namespace rtc::run {
 struct CellResult {
     std::string cell;
     bool passed = false;
-    std::string detail;  // why not
+    std::string detail;      // why not
+    std::string known = {};  // on a native driver: the recorded reason why it differs
 };
 
 // One result a cell of the case. Expectations without values take them from `oracle`.
