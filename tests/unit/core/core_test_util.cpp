@@ -86,15 +86,26 @@ void expect_clear_error(const LinkResult& result, const std::string& what) {
         EXPECT_NE(d.id.rfind("internal", 0), 0u) << what << " was not recognised:\n" << describe(result);
 }
 
-std::string raygen_text(const std::string& globals, const std::string& body, const std::string& annotations,
-                        const std::string& functions) {
-    return R"(OpCapability RayTracingNV
-OpExtension "SPV_NV_ray_tracing"
+const char* const kPayload =
+    "%ptr_payload = OpTypePointer RayPayloadNV %float\n%payload = OpVariable %ptr_payload RayPayloadNV\n";
+const char* const kPayloadLocation = "OpDecorate %payload Location 0\n";
+const char* const kTrace =
+    "%s = OpLoad %as %scene\n"
+    "OpTraceNV %s %uint_0 %uint_255 %uint_0 %uint_0 %uint_0 %zero3 %float_0 %up3 %float_1 %uint_0\n";
+
+std::string trace_text(const std::string& flags, const std::string& mask, const std::string& offset,
+                       const std::string& miss, const std::string& payload) {
+    return "%s = OpLoad %as %scene\nOpTraceNV %s " + flags + " " + mask + " " + offset + " %uint_0 " + miss +
+           " %zero3 %float_0 %up3 %float_1 " + payload + "\n";
+}
+
+std::string stage_text(const StageText& parts) {
+    return "OpCapability RayTracingNV\n" + parts.preamble + R"(OpExtension "SPV_NV_ray_tracing"
 OpMemoryModel Logical GLSL450
-OpEntryPoint RayGenerationNV %main "main"
+OpEntryPoint )" + parts.model + R"( %main "main"
 OpDecorate %scene DescriptorSet 0
 OpDecorate %scene Binding 0
-)" + annotations + R"(
+)" + parts.annotations + R"(
 %void = OpTypeVoid
 %fn = OpTypeFunction %void
 %bool = OpTypeBool
@@ -111,13 +122,23 @@ OpDecorate %scene Binding 0
 %as = OpTypeAccelerationStructureNV
 %ptr_as = OpTypePointer UniformConstant %as
 %scene = OpVariable %ptr_as UniformConstant
-)" + globals + R"(
+)" + parts.globals + R"(
 %main = OpFunction %void None %fn
 %entry = OpLabel
-)" + body + R"(
+)" + parts.body + R"(
 OpReturn
 OpFunctionEnd
-)" + functions;
+)" + parts.functions;
+}
+
+std::string raygen_text(const std::string& globals, const std::string& body, const std::string& annotations,
+                        const std::string& functions) {
+    StageText parts;
+    parts.globals = globals;
+    parts.body = body;
+    parts.annotations = annotations;
+    parts.functions = functions;
+    return stage_text(parts);
 }
 
 }  // namespace rtc::test

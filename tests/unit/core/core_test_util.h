@@ -31,10 +31,23 @@ bool has_diagnostic(const LinkResult& result, const std::string& id, Severity se
 // Fails the test unless linking failed and gave at least one error with a text and an id.
 void expect_clear_error(const LinkResult& result, const std::string& what);
 
-// A module of one ray generation entry point `main`: `globals` after the common types, `body` in main's block.
-// Common ids: %void %fn %bool %float %uint %int %v3float %float_0 %float_1 %uint_0 %uint_255 %zero3 %up3 %as %ptr_as
-// %scene (set 0, binding 0).
+// A module of one entry point `main` of the execution model (RayGenerationNV, MissNV, ...): `globals` after the common
+// types, `body` in main's block. Common ids: %void %fn %bool %float %uint %int %v3float %float_0 %float_1 %uint_0
+// %uint_255 %zero3 %up3 %as %ptr_as %scene (set 0, binding 0).
+struct StageText {
+    std::string model = "RayGenerationNV";
+    std::string globals, body, annotations, functions;
+    std::string preamble;  // further capabilities and extensions
+};
+std::string stage_text(const StageText& parts);
 std::string raygen_text(const std::string& globals, const std::string& body, const std::string& annotations = "",
                         const std::string& functions = "");
+
+// A payload of one float at location 0, and a trace with it (numbers are NV's).
+extern const char* const kPayload;
+extern const char* const kPayloadLocation;
+extern const char* const kTrace;
+std::string trace_text(const std::string& flags, const std::string& mask, const std::string& offset,
+                       const std::string& miss, const std::string& payload);
 
 }  // namespace rtc::test

@@ -12,18 +12,9 @@ namespace {
 
 using Words = std::vector<uint32_t>;
 
-const std::string kPayload = R"(%ptr_payload = OpTypePointer RayPayloadNV %float
-%payload = OpVariable %ptr_payload RayPayloadNV
-)";
-const std::string kTrace = R"(OpStore %payload %float_0
-%s = OpLoad %as %scene
-OpTraceNV %s %uint_0 %uint_255 %uint_0 %uint_0 %uint_0 %zero3 %float_0 %up3 %float_1 %uint_0
-)";
-// The payload is named by the trace's number alone: nothing else uses the variable.
-const std::string kTraceOnly = kTrace.substr(kTrace.find("%s ="));
-const std::string kLocation = "OpDecorate %payload Location 0\n";
+const std::string kStoreAndTrace = std::string("OpStore %payload %float_0\n") + kTrace;
 
-Words good_raygen() { return assemble(raygen_text(kPayload, kTrace, kLocation)); }
+Words good_raygen() { return assemble(raygen_text(kPayload, kStoreAndTrace, kPayloadLocation)); }
 
 LinkResult link_raygen(const Words& words) { return link({{StageKind::RayGen, words}}); }
 
@@ -47,7 +38,7 @@ TEST(Malformed, TheUndamagedModuleLinks) {
 }
 
 TEST(Malformed, APayloadNamedOnlyByTheTraceIsFound) {
-    const LinkResult result = link_raygen(assemble(raygen_text(kPayload, kTraceOnly, kLocation)));
+    const LinkResult result = link_raygen(assemble(raygen_text(kPayload, kTrace, kPayloadLocation)));
     EXPECT_TRUE(result.ok) << describe(result);
 }
 
@@ -207,7 +198,7 @@ TEST(Malformed, CyclicTypes) {
         // The same, used as the payload's type, so that a pass has to look inside.
         expect_rejected(raygen_text(std::string(text) + "\n%pt = OpTypePointer RayPayloadNV %t\n"
                                                         "%payload = OpVariable %pt RayPayloadNV\n",
-                                    kTraceOnly, kLocation),
+                                    kTrace, kPayloadLocation),
                         what);
     }
 }
@@ -222,7 +213,7 @@ TEST(Malformed, DeeplyNestedTypes) {
     for (int i = 1; i < 20000; ++i)
         text += "%t" + std::to_string(i) + " = OpTypeStruct %t" + std::to_string(i - 1) + "\n";
     text += "%pt = OpTypePointer RayPayloadNV %t19999\n%payload = OpVariable %pt RayPayloadNV\n";
-    expect_rejected(raygen_text(text, kTraceOnly, kLocation), "a payload nested 20 000 deep");
+    expect_rejected(raygen_text(text, kTrace, kPayloadLocation), "a payload nested 20 000 deep");
 }
 
 TEST(Malformed, HugePayloads) {
@@ -237,18 +228,18 @@ TEST(Malformed, HugePayloads) {
     for (const auto& [what, text] : cases)
         expect_rejected(raygen_text(std::string(text) + "%pt = OpTypePointer RayPayloadNV %t\n"
                                                         "%payload = OpVariable %pt RayPayloadNV\n",
-                                    kTraceOnly, kLocation),
+                                    kTrace, kPayloadLocation),
                         what);
 }
 
 // A local of 2^20 structs, live across a trace: an error or a module, but no word-by-word expansion.
 TEST(Malformed, HugeLiveArray) {
     const LinkResult result = link_raygen(assemble(raygen_text(
-        kPayload + "%n = OpConstant %uint 1048576\n%arr = OpTypeArray %v3float %n\n%pa = OpTypePointer Function %arr\n"
+        std::string(kPayload) + "%n = OpConstant %uint 1048576\n%arr = OpTypeArray %v3float %n\n%pa = OpTypePointer Function %arr\n"
                    "%pf = OpTypePointer Function %v3float\n",
-        "%a = OpVariable %pa Function\n%e = OpAccessChain %pf %a %uint_255\nOpStore %e %zero3\n" + kTrace +
+        "%a = OpVariable %pa Function\n%e = OpAccessChain %pf %a %uint_255\nOpStore %e %zero3\n" + kStoreAndTrace +
             "%v = OpLoad %v3float %e\nOpStore %e %v\n",
-        kLocation)));
+        kPayloadLocation)));
     EXPECT_LT(result.spirv.size(), 1000000u);
     if (!result.ok) expect_clear_error(result, "a live array of 12 MiB");
 }
@@ -273,8 +264,8 @@ TEST(Malformed, Recursion) {
                                 "OpReturn\nOpFunctionEnd\n"),
                     "a function that calls itself");
     expect_rejected(raygen_text("", "%v = OpFunctionCall %void %main"), "main calling itself");
-    expect_rejected(raygen_text(kPayload, "%v = OpFunctionCall %void %f", kLocation,
-                                "%f = OpFunction %void None %fn\n%fl = OpLabel\n" + kTrace +
+    expect_rejected(raygen_text(kPayload, "%v = OpFunctionCall %void %f", kPayloadLocation,
+                                "%f = OpFunction %void None %fn\n%fl = OpLabel\n" + kStoreAndTrace +
                                     "%fv = OpFunctionCall %void %g\nOpReturn\nOpFunctionEnd\n"
                                     "%g = OpFunction %void None %fn\n%gl = OpLabel\n%gv = OpFunctionCall %void %f\n"
                                     "OpReturn\nOpFunctionEnd\n"),
@@ -306,7 +297,7 @@ TEST(Malformed, DeeplyNestedBranches) {
         tail = "OpBranch %m" + n + "\n%m" + n + " = OpLabel\n" + tail;
     }
     const LinkResult result =
-        link_raygen(assemble(raygen_text("%true = OpConstantTrue %bool\n" + kPayload, body + kTrace + tail, kLocation)));
+        link_raygen(assemble(raygen_text(std::string("%true = OpConstantTrue %bool\n") + kPayload, body + kStoreAndTrace + tail, kPayloadLocation)));
     if (!result.ok) expect_clear_error(result, "3000 nested branches");
 }
 
@@ -335,9 +326,9 @@ TEST(Malformed, TraceOperands) {
         return "OpStore %payload %float_0\n%s = OpLoad %as %scene\nOpTraceNV " + operands + "\n";
     };
     const std::string good = "%s %uint_0 %uint_255 %uint_0 %uint_0 %uint_0 %zero3 %float_0 %up3 %float_1 %uint_0";
-    ASSERT_TRUE(link_raygen(assemble(raygen_text(kPayload, trace(good), kLocation))).ok);
+    ASSERT_TRUE(link_raygen(assemble(raygen_text(kPayload, trace(good), kPayloadLocation))).ok);
     const auto reject = [&](const std::string& operands, const char* what) {
-        expect_rejected(raygen_text(kPayload, trace(operands), kLocation), what);
+        expect_rejected(raygen_text(kPayload, trace(operands), kPayloadLocation), what);
     };
     reject("%s %float_0 %uint_255 %uint_0 %uint_0 %uint_0 %zero3 %float_0 %up3 %float_1 %uint_0", "float ray flags");
     reject("%s %uint_0 %uint_255 %uint_0 %uint_0 %uint_0 %float_0 %float_0 %up3 %float_1 %uint_0", "a scalar origin");

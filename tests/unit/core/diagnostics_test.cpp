@@ -1,0 +1,309 @@
+// One input per diagnostic of the core: it gives this id and a text, and, for an error, no module.
+// tests/unit/core/diagnostics_listed.py checks that no id is missing here and in docs/troubleshooting.md.
+#include <gtest/gtest.h>
+
+#include "core_test_util.h"
+
+namespace rtc::test {
+namespace {
+
+std::vector<uint32_t> module_of(const StageText& parts, unsigned minor_version = 3) {
+    return assemble(stage_text(parts), minor_version);
+}
+
+StageText raygen(const std::string& globals, const std::string& body, const std::string& annotations = "",
+                 const std::string& functions = "") {
+    StageText parts;
+    parts.globals = globals;
+    parts.body = body;
+    parts.annotations = annotations;
+    parts.functions = functions;
+    return parts;
+}
+
+StageText stage(const char* model, const std::string& globals = "", const std::string& body = "",
+                const std::string& annotations = "") {
+    StageText parts = raygen(globals, body, annotations);
+    parts.model = model;
+    return parts;
+}
+
+StageText tracing_raygen() { return raygen(kPayload, kTrace, kPayloadLocation); }
+
+void expect_error(const LinkResult& result, const std::string& id) {
+    EXPECT_FALSE(result.ok) << "accepted; expected " << id;
+    EXPECT_TRUE(has_diagnostic(result, id)) << "expected " << id << "; got: " << describe(result);
+    EXPECT_TRUE(result.spirv.empty());
+}
+
+void expect_error(const StageText& raygen_parts, const std::string& id) {
+    expect_error(link({{StageKind::RayGen, module_of(raygen_parts)}}), id);
+}
+
+// Of a second stage beside a ray generation stage.
+void expect_error(StageKind kind, const StageText& parts, const std::string& id) {
+    expect_error(link({{StageKind::RayGen, module_of(raygen("", ""))}, {kind, module_of(parts)}}), id);
+}
+
+void expect_warning(const StageText& raygen_parts, const std::string& id) {
+    const LinkResult result =
+        link({{StageKind::RayGen, module_of(raygen_parts)}, {StageKind::Miss, module_of(stage("MissNV"))}});
+    EXPECT_TRUE(result.ok) << describe(result);
+    EXPECT_TRUE(has_diagnostic(result, id, Severity::Warning)) << "expected " << id << "; got: " << describe(result);
+}
+
+TEST(Diagnostics, TheTestsOwnStagesLink) {
+    const LinkResult result =
+        link({{StageKind::RayGen, module_of(tracing_raygen())}, {StageKind::Miss, module_of(stage("MissNV"))}});
+    EXPECT_TRUE(result.ok) << describe(result);
+    EXPECT_TRUE(result.diagnostics.empty()) << describe(result);
+}
+
+// ---- traces ----
+
+TEST(Diagnostics, TraceLocations) {
+    const auto trace = [](const char* payload) { return trace_text("%uint_0", "%uint_255", "%uint_0", "%uint_0", payload); };
+    expect_error(raygen(kPayload, trace("%uint_255"), kPayloadLocation), "trace-location-unknown");
+    expect_error(raygen(std::string(kPayload) + "%number = OpSpecConstant %uint 0\n", trace("%number"),
+                        std::string(kPayloadLocation) + "OpDecorate %number SpecId 1\n"),
+                 "trace-location-not-constant");
+}
+
+TEST(Diagnostics, TraceOperands) {
+    expect_error(raygen(kPayload, trace_text("%float_0", "%uint_255", "%uint_0", "%uint_0", "%uint_0"), kPayloadLocation),
+                 "call-operand");
+}
+
+TEST(Diagnostics, InstructionsOfOtherStages) {
+    expect_error(StageKind::AnyHit, stage("AnyHitNV", kPayload, kTrace, kPayloadLocation), "call-stage");
+    expect_error(raygen("", "OpIgnoreIntersectionNV\n"), "call-stage");
+}
+
+TEST(Diagnostics, VariablesOfOtherStages) {
+    expect_error(raygen("%pi = OpTypePointer HitAttributeNV %float\n%attribute = OpVariable %pi HitAttributeNV\n",
+                        "%v = OpLoad %float %attribute\n"),
+                 "storage-stage");
+}
+
+TEST(Diagnostics, TracesThatCannotHit) {
+    const auto trace = [](const char* flags, const char* mask, const char* offset, const char* miss) {
+        return raygen(std::string(kPayload) + "%uint_3 = OpConstant %uint 3\n%uint_9 = OpConstant %uint 9\n",
+                      trace_text(flags, mask, offset, miss, "%uint_0"), kPayloadLocation);
+    };
+    expect_warning(trace("%uint_0", "%uint_0", "%uint_0", "%uint_0"), "cull-mask-zero");
+    expect_warning(trace("%uint_3", "%uint_255", "%uint_0", "%uint_0"), "ray-flags-contradict");
+    expect_warning(trace("%uint_0", "%uint_255", "%uint_0", "%uint_9"), "miss-index-range");
+    expect_warning(trace("%uint_0", "%uint_255", "%uint_9", "%uint_0"), "sbt-offset-range");
+}
+
+// ---- what ray tracing shaders cannot have, or rtc not yet ----
+
+TEST(Diagnostics, OutsideRayTracing) {
+    expect_error(raygen("%pw = OpTypePointer Workgroup %float\n%shared = OpVariable %pw Workgroup\n",
+                        "OpStore %shared %float_0\n"),
+                 "shared-memory");
+    expect_error(raygen("%uint_2 = OpConstant %uint 2\n", "OpControlBarrier %uint_2 %uint_2 %uint_0\n"), "barrier");
+    expect_error(raygen("%pi = OpTypePointer Input %float\n%input = OpVariable %pi Input\n", "%v = OpLoad %float %input\n",
+                        "OpDecorate %input Location 0\n"),
+                 "input-without-builtin");
+}
+
+TEST(Diagnostics, NotYet) {
+    StageText motion = raygen(kPayload,
+                              "%s = OpLoad %as %scene\n"
+                              "OpTraceMotionNV %s %uint_0 %uint_255 %uint_0 %uint_0 %uint_0 %zero3 %float_0 %up3 %float_1 "
+                              "%float_0 %uint_0\n",
+                              kPayloadLocation);
+    motion.preamble = "OpCapability RayTracingMotionBlurNV\nOpExtension \"SPV_NV_ray_tracing_motion_blur\"\n";
+    expect_error(motion, "motion-unsupported");
+
+    const char* const khr =
+        "OpCapability RayTracingKHR\n%s\nOpExtension \"SPV_KHR_ray_tracing\"\n%s\nOpMemoryModel Logical GLSL450\n"
+        "OpEntryPoint RayGenerationKHR %%main \"main\"%s\n%%void = OpTypeVoid\n%%fn = OpTypeFunction %%void\n"
+        "%%uint = OpTypeInt 32 0\n%%uint_0 = OpConstant %%uint 0\n%%v2 = OpTypeVector %%uint 2\n"
+        "%%pair = OpConstantComposite %%v2 %%uint_0 %%uint_0\n%%as = OpTypeAccelerationStructureKHR\n%s\n"
+        "%%main = OpFunction %%void None %%fn\n%%l = OpLabel\n%s\nOpReturn\nOpFunctionEnd\n";
+    char text[2048];
+    std::snprintf(text, sizeof text, khr, "", "", "", "", "%s = OpConvertUToAccelerationStructureKHR %as %pair");
+    expect_error(link({{StageKind::RayGen, assemble(text, 4)}}), "as-from-address");
+    std::snprintf(text, sizeof text, khr, "OpCapability RayQueryKHR", "OpExtension \"SPV_KHR_ray_query\"", " %query",
+                  "%rq = OpTypeRayQueryKHR\n%prq = OpTypePointer Private %rq\n%query = OpVariable %prq Private\n"
+                  "%bool = OpTypeBool\n",
+                  "%p = OpRayQueryProceedKHR %bool %query");
+    expect_error(link({{StageKind::RayGen, assemble(text, 4)}}), "ray-query-unsupported");
+}
+
+TEST(Diagnostics, BuiltIns) {
+    expect_error(raygen("%pi = OpTypePointer Input %float\n%input = OpVariable %pi Input\n", "%v = OpLoad %float %input\n",
+                        "OpDecorate %input BuiltIn HitTNV\n"),
+                 "builtin-stage");
+    expect_error(raygen("%pi = OpTypePointer Input %v3uint\n%v3uint = OpTypeVector %uint 3\n", "", ""), "spirv-invalid");
+}
+
+// ---- payloads, attributes, records ----
+
+TEST(Diagnostics, SeveralWhereOneIsAllowed) {
+    expect_error(StageKind::Miss,
+                 stage("MissNV",
+                       "%pi = OpTypePointer IncomingRayPayloadNV %float\n%a = OpVariable %pi IncomingRayPayloadNV\n"
+                       "%b = OpVariable %pi IncomingRayPayloadNV\n",
+                       "OpStore %a %float_0\nOpStore %b %float_0\n"),
+                 "several-incoming");
+    expect_error(raygen("%block = OpTypeStruct %float\n%pr = OpTypePointer ShaderRecordBufferNV %block\n"
+                        "%pf = OpTypePointer ShaderRecordBufferNV %float\n"
+                        "%a = OpVariable %pr ShaderRecordBufferNV\n%b = OpVariable %pr ShaderRecordBufferNV\n",
+                        "%x = OpAccessChain %pf %a %uint_0\n%v = OpLoad %float %x\n"
+                        "%y = OpAccessChain %pf %b %uint_0\n%w = OpLoad %float %y\n",
+                        "OpDecorate %block Block\nOpMemberDecorate %block 0 Offset 0\n"),
+                 "several-records");
+}
+
+TEST(Diagnostics, RecordsAreReadOnly) {
+    expect_error(raygen("%block = OpTypeStruct %float\n%pr = OpTypePointer ShaderRecordBufferNV %block\n"
+                        "%pf = OpTypePointer ShaderRecordBufferNV %float\n%a = OpVariable %pr ShaderRecordBufferNV\n",
+                        "%x = OpAccessChain %pf %a %uint_0\nOpStore %x %float_0\n",
+                        "OpDecorate %block Block\nOpMemberDecorate %block 0 Offset 0\n"),
+                 "record-access");
+}
+
+TEST(Diagnostics, Sizes) {
+    const auto payload_of = [](const std::string& type) {
+        return raygen(type + "%pt = OpTypePointer RayPayloadNV %t\n%payload = OpVariable %pt RayPayloadNV\n", kTrace,
+                      kPayloadLocation);
+    };
+    expect_error(payload_of("%n = OpConstant %uint 100000\n%t = OpTypeArray %float %n\n"), "value-too-large");
+    expect_error(payload_of("%t = OpTypeStruct %as\n"), "value-not-storable");
+    StageText sized = payload_of("%n = OpSpecConstant %uint 4\n%t = OpTypeArray %float %n\n");
+    sized.annotations += "OpDecorate %n SpecId 3\n";
+    expect_error(sized, "spec-sized-array");
+    expect_error(StageKind::ClosestHit,
+                 stage("ClosestHitNV",
+                       "%uint_9 = OpConstant %uint 9\n%t = OpTypeArray %float %uint_9\n"
+                       "%pt = OpTypePointer HitAttributeNV %t\n%attribute = OpVariable %pt HitAttributeNV\n",
+                       "%v = OpLoad %t %attribute\n"),
+                 "attribute-too-large");
+}
+
+// Each function calls the one before twice, and the first traces: 2^17 traces once inlined.
+TEST(Diagnostics, InliningIsBounded) {
+    std::string functions = "%f0 = OpFunction %void None %fn\n%l0 = OpLabel\n" + std::string(kTrace) + "OpReturn\nOpFunctionEnd\n";
+    for (int i = 1; i <= 17; ++i) {
+        const std::string n = std::to_string(i), before = std::to_string(i - 1);
+        functions += "%f" + n + " = OpFunction %void None %fn\n%l" + n + " = OpLabel\n%a" + n +
+                     " = OpFunctionCall %void %f" + before + "\n%b" + n + " = OpFunctionCall %void %f" + before +
+                     "\nOpReturn\nOpFunctionEnd\n";
+    }
+    expect_error(raygen(kPayload, "%call = OpFunctionCall %void %f17\n", kPayloadLocation, functions), "inline-too-large");
+}
+
+TEST(Diagnostics, FunctionRecursion) {
+    expect_error(raygen("", "%v = OpFunctionCall %void %f\n", "",
+                        "%f = OpFunction %void None %fn\n%fl = OpLabel\n%fv = OpFunctionCall %void %f\n"
+                        "OpReturn\nOpFunctionEnd\n"),
+                 "function-recursion");
+}
+
+// ---- resources ----
+
+const char* const kBlock =
+    "%block = OpTypeStruct %float\n%pb = OpTypePointer Uniform %block\n%pf = OpTypePointer Uniform %float\n"
+    "%buffer = OpVariable %pb Uniform\n";
+const char* const kReadBlock = "%x = OpAccessChain %pf %buffer %uint_0\n%v = OpLoad %float %x\n";
+const char* const kBlockLayout = "OpDecorate %block Block\nOpMemberDecorate %block 0 Offset 0\n";
+
+TEST(Diagnostics, ResourceWithoutBinding) {
+    expect_error(raygen(kBlock, kReadBlock, kBlockLayout), "resource-without-binding");
+}
+
+TEST(Diagnostics, ResourceConflict) {
+    StageText reader = stage("MissNV", kBlock, kReadBlock,
+                             std::string(kBlockLayout) + "OpDecorate %buffer DescriptorSet 0\nOpDecorate %buffer Binding 0\n");
+    expect_error(link({{StageKind::RayGen, module_of(tracing_raygen())}, {StageKind::Miss, module_of(reader)}}),
+                 "resource-conflict");
+}
+
+TEST(Diagnostics, PushConstantConflict) {
+    const auto pushes = [](const char* model, const char* type) {
+        return module_of(stage(model,
+                               std::string("%block = OpTypeStruct ") + type +
+                                   "\n%pb = OpTypePointer PushConstant %block\n%pf = OpTypePointer PushConstant " + type +
+                                   "\n%constants = OpVariable %pb PushConstant\n",
+                               std::string("%x = OpAccessChain %pf %constants %uint_0\n%v = OpLoad ") + type + " %x\n",
+                               kBlockLayout));
+    };
+    expect_error(link({{StageKind::RayGen, pushes("RayGenerationNV", "%float")}, {StageKind::Miss, pushes("MissNV", "%uint")}}),
+                 "push-constant-conflict");
+}
+
+TEST(Diagnostics, ReservedConflict) {
+    LinkOptions options;
+    options.reserved_set = 0;
+    options.reserved_binding = 0;
+    expect_error(link({{StageKind::RayGen, module_of(tracing_raygen())}}, options), "reserved-conflict");
+}
+
+TEST(Diagnostics, SpecialisationOfNoConstant) {
+    Stage specialised{StageKind::RayGen, module_of(tracing_raygen()), "main", {{4711, 1}}};
+    const LinkResult result = link({specialised});
+    EXPECT_TRUE(has_diagnostic(result, "spec-unknown", Severity::Error) ||
+                has_diagnostic(result, "spec-unknown", Severity::Warning))
+        << describe(result);
+}
+
+// ---- pipelines ----
+
+TEST(Diagnostics, Pipelines) {
+    expect_error(link_pipeline({}, {}), "pipeline-empty");
+    expect_error(link({{StageKind::Miss, module_of(stage("MissNV"))}}), "pipeline-without-raygen");
+    const Stage raygen_stage{StageKind::RayGen, module_of(raygen("", ""))};
+    expect_error(link(std::vector<Stage>(4001, raygen_stage)), "pipeline-too-large");
+    LinkOptions options;
+    options.max_recursion_depth = 32;
+    expect_error(link({raygen_stage}, options), "recursion-limit");
+    expect_error(link({{StageKind::RayGen, raygen_stage.spirv, "other"}}), "entry-point-missing");
+}
+
+TEST(Diagnostics, Groups) {
+    PipelineInput input = pipeline({{StageKind::RayGen, module_of(raygen("", ""))},
+                                    {StageKind::ClosestHit, module_of(stage("ClosestHitNV"))},
+                                    {StageKind::Intersection, module_of(stage("IntersectionNV"))}});
+    PipelineInput bad = input;
+    bad.groups[1].closest_hit = 0;
+    expect_error(link_pipeline(bad, {}), "group-stage");
+    bad = input;
+    bad.groups[0].general = 99;
+    expect_error(link_pipeline(bad, {}), "group-stage");
+    bad = input;
+    bad.groups[1].kind = GroupKind::Procedural;
+    expect_error(link_pipeline(bad, {}), "group-without-intersection");
+    bad = input;
+    bad.groups[1].intersection = 2;
+    expect_error(link_pipeline(bad, {}), "group-intersection");
+}
+
+// ---- SPIR-V itself; malformed_test.cpp has many more of the first ----
+
+TEST(Diagnostics, Binaries) {
+    const std::vector<uint32_t> good = module_of(tracing_raygen());
+    std::vector<uint32_t> words = good;
+    words[0] = 1;
+    expect_error(link({{StageKind::RayGen, words}}), "spirv-malformed");
+    words = good;
+    words[1] = 0x00020000;
+    expect_error(link({{StageKind::RayGen, words}}), "spirv-version");
+    words = good;
+    words.insert(words.begin() + 5, 1u << 16 | 0xfff0u);
+    expect_error(link({{StageKind::RayGen, words}}), "spirv-unknown-opcode");
+    StageText parts = raygen("", "");
+    parts.preamble = "%set = OpExtInstImport \"OpenCL.std\"\n";
+    std::string text = stage_text(parts);
+    // The import belongs behind the extensions.
+    const std::string import = parts.preamble;
+    text.erase(text.find(import), import.size());
+    text.insert(text.find("OpMemoryModel"), import);
+    expect_error(link({{StageKind::RayGen, assemble(text)}}), "spirv-unknown-instruction-set");
+    expect_error(raygen("", "%sum = OpIAdd %float %uint_0 %uint_0\n"), "spirv-invalid");
+}
+
+}  // namespace
+}  // namespace rtc::test
