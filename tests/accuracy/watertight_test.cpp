@@ -124,6 +124,26 @@ TEST_F(LabTest, FarOriginsStillHit) {
     }
 }
 
+// Boxes must contain all that the triangle test can hit, also the boxes of
+// thin instances whose rays were rounded on the way into their space.
+TEST_F(LabTest, NoBoxHidesAHit) {
+    const IndexedMesh plane = make_plane(16), far_plane = moved(plane, 1, {1e4, -1e4, 5e3});
+    Instance turned;  // 90 degrees about x, far away
+    turned.object_to_world = {{{1, 0, 0, 1e4f}, {0, 0, -1, -5e3f}, {0, 1, 0, 7e3f}}};
+    LeakCase cases[4];
+    cases[0].mesh = &plane;
+    cases[1].mesh = &far_plane;
+    cases[1].centre = {1e4f, -1e4f, 5e3f};
+    cases[2].mesh = &plane;
+    cases[2].instance = turned;
+    cases[3].mesh = &plane;
+    cases[3].distance = 1e5;
+    for (const LeakCase& c : cases) {
+        EXPECT_EQ(count_false_culls(shared_tracer(), c, kRays), 0u);
+        EXPECT_GT(count_false_culls(shared_tracer(Variant::Fast), c, kRays), 0u) << "the test is blind";
+    }
+}
+
 // The laboratory must be able to fail: with products and sums contracted, as
 // compilers do without NoContraction, the same test leaks. (Rays at vertices
 // do not: contraction that treats all vertices alike only moves the edges'

@@ -40,7 +40,41 @@ Transform translated(Transform m, float x, float y, float z) {
     return m;
 }
 
+Transform product(const Transform& a, const Transform& b) {
+    Transform c{};
+    for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 4; ++j) {
+            double sum = j == 3 ? a[i][3] : 0;
+            for (int k = 0; k < 3; ++k) sum += double(a[i][k]) * b[k][j];
+            c[i][j] = float(sum);
+        }
+    }
+    return c;
+}
+
 Transform scaled(float x, float y, float z) { return {{{x, 0, 0, 0}, {0, y, 0, 0}, {0, 0, z, 0}}}; }
+
+const std::vector<std::pair<std::string, Transform>>& transforms() {
+    static const std::vector<std::pair<std::string, Transform>> table = {
+        {"identity", kIdentity},
+        {"rotated", rotation(0.7, 0.3)},
+        {"rotated + 1e2", translated(rotation(0.7, 0.3), 100, -50, 75)},
+        {"rotated + 1e4", translated(rotation(0.7, 0.3), 1e4f, -5e3f, 7e3f)},
+        {"rotX90 + 1e4", translated({{{1, 0, 0, 0}, {0, 0, -1, 0}, {0, 1, 0, 0}}}, 1e4f, -5e3f, 7e3f)},
+        {"sheared", {{{1, 0.7f, -0.4f, 1}, {0, 0.5f, 0.9f, 2}, {0.2f, 0, 3, -4}}}},
+        {"mirrored", scaled(-1, 1.25f, 0.75f)},
+        {"scale 1e-3", scaled(1e-3f, 1e-3f, 1e-3f)},
+        {"scale 1e3", scaled(1e3f, 1e3f, 1e3f)},
+        {"scale 1e3 + 1e6", translated(scaled(1e3f, 1e3f, 1e3f), 1e6f, 0, -1e6f)},
+        {"stretch 1e3:1", scaled(1e3f, 1, 1)},
+        {"stretch 1e6:1", scaled(1e3f, 1, 1e-3f)},
+        {"oblique 1e1:1", product(rotation(0.7, 0.3), product(scaled(10, 1, 1), rotation(0.4, 1.1)))},
+        {"oblique 1e2:1", product(rotation(0.7, 0.3), product(scaled(100, 1, 1), rotation(0.4, 1.1)))},
+        {"oblique 1e3:1", product(rotation(0.7, 0.3), product(scaled(1e3f, 1, 1), rotation(0.4, 1.1)))},
+        {"oblique 1e4:1", product(rotation(0.7, 0.3), product(scaled(1e3f, 1, 0.1f), rotation(0.4, 1.1)))},
+    };
+    return table;
+}
 
 std::vector<Placed> points_of(const std::string& axis) {
     std::vector<Placed> points;
@@ -73,23 +107,9 @@ std::vector<Placed> points_of(const std::string& axis) {
     } else if (axis == "distance") {
         for (int e = 1; e <= 8; ++e) add(power_text(e), make_icosphere(4), 1, e <= 5).c.distance = std::pow(10.0, e);
     } else if (axis == "transform") {
-        const std::pair<const char*, Transform> transforms[] = {
-            {"identity", kIdentity},
-            {"rotated", rotation(0.7, 0.3)},
-            {"rotated + 1e2", translated(rotation(0.7, 0.3), 100, -50, 75)},
-            {"rotated + 1e4", translated(rotation(0.7, 0.3), 1e4f, -5e3f, 7e3f)},
-            {"rotX90 + 1e4", translated({{{1, 0, 0, 0}, {0, 0, -1, 0}, {0, 1, 0, 0}}}, 1e4f, -5e3f, 7e3f)},
-            {"sheared", {{{1, 0.7f, -0.4f, 1}, {0, 0.5f, 0.9f, 2}, {0.2f, 0, 3, -4}}}},
-            {"mirrored", scaled(-1, 1.25f, 0.75f)},
-            {"scale 1e-3", scaled(1e-3f, 1e-3f, 1e-3f)},
-            {"scale 1e3", scaled(1e3f, 1e3f, 1e3f)},
-            {"scale 1e3 + 1e6", translated(scaled(1e3f, 1e3f, 1e3f), 1e6f, 0, -1e6f)},
-            {"stretch 1e3:1", scaled(1e3f, 1, 1)},
-            {"stretch 1e6:1", scaled(1e3f, 1, 1e-3f)},
-        };
-        for (const auto& [name, transform] : transforms) {
+        for (const auto& [name, transform] : transforms()) {
             for (const IndexedMesh& mesh : {make_icosphere(4), make_torus_knot(200, 16)}) {
-                const bool promised = std::string(name) != "stretch 1e6:1";
+                const bool promised = name != "stretch 1e6:1" && name != "oblique 1e4:1";
                 add(name, mesh, 1.6, promised).c.instance.object_to_world = transform;
             }
         }
@@ -191,6 +211,38 @@ void measure_axis(DeviceTracer& tracer, const std::string& axis, uint64_t rays, 
                 row.counts.add(count_leaks(tracer, point.c, rays - rays / 2));
             }
             rows.push_back(row);
+        }
+    }
+}
+
+void measure_culls(DeviceTracer& tracer, uint64_t rays, std::vector<CullRow>& rows) {
+    uint64_t seed = 500;
+    auto measure = [&](const std::string& place, const IndexedMesh& mesh, LeakCase c) {
+        c.mesh = &mesh;
+        c.aim = Aim::Edge;
+        c.size = 1.6;
+        c.seed = ++seed;
+        rows.push_back({mesh.name, place, rays, count_false_culls(tracer, c, rays)});
+    };
+    for (const IndexedMesh& mesh : {make_plane(16), make_icosphere(3)}) {
+        for (const auto& [name, transform] : transforms()) {
+            LeakCase c;
+            c.instance.object_to_world = transform;
+            measure(name, mesh, c);
+        }
+        for (double at : {1e2, 1e4, 1e6}) {
+            LeakCase c;
+            c.centre = {float(at), float(-at), float(at / 2)};
+            char text[32];
+            std::snprintf(text, sizeof text, "offset %.0e", at);
+            measure(text, moved(mesh, 1, {at, -at, at / 2}), c);
+        }
+        for (double distance : {1e2, 1e4, 1e6}) {
+            LeakCase c;
+            c.distance = distance;
+            char text[32];
+            std::snprintf(text, sizeof text, "distance %.0e", distance);
+            measure(text, mesh, c);
         }
     }
 }

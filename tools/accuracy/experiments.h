@@ -17,6 +17,12 @@ struct LeakRow {
     LeakCounts counts;
 };
 
+// Boxes that hide what the triangle test would hit.
+struct CullRow {
+    std::string mesh, place;
+    uint64_t rays = 0, culls = 0;
+};
+
 // First hits against exact arithmetic.
 struct ExactRow {
     std::string scene;
@@ -41,6 +47,7 @@ struct CostRow {
 struct Report {
     Variant variant = Variant::Watertight;
     std::vector<LeakRow> leaks;
+    std::vector<CullRow> culls;
     std::vector<ExactRow> exact;
     std::vector<CostRow> cost;
 };
@@ -49,6 +56,7 @@ struct Report {
 const std::vector<std::string>& axis_names();
 
 void measure_axis(DeviceTracer& tracer, const std::string& axis, uint64_t rays, std::vector<LeakRow>& rows);
+void measure_culls(DeviceTracer& tracer, uint64_t rays, std::vector<CullRow>& rows);
 void measure_exact(DeviceTracer& tracer, uint64_t rays, std::vector<ExactRow>& rows);
 void measure_cost(DeviceTracer& tracer, uint64_t rays, std::vector<CostRow>& rows);
 

@@ -48,6 +48,16 @@ std::string markdown(const Report& report, const std::string& device) {
         }
         out << '\n';
     }
+    if (!report.culls.empty()) {
+        out << "False box culls: rays that see other candidates when every box is inflated.\n\n"
+            << "| mesh | place | rays | culled |\n|---|---|---|---|\n";
+        for (const CullRow& r : report.culls) {
+            std::snprintf(line, sizeof line, "| %s | %s | %llu | %llu |\n", r.mesh.c_str(), r.place.c_str(),
+                          (unsigned long long)r.rays, (unsigned long long)r.culls);
+            out << line;
+        }
+        out << '\n';
+    }
     if (!report.exact.empty()) {
         out << "First hits against exact arithmetic; t error in ulps of the exact t.\n\n"
             << "| scene | rays | hits | missed | invented | other triangle | exact ties | farthest from an edge | "
@@ -79,6 +89,9 @@ nlohmann::ordered_json to_json(const Report& report) {
                                  {"bound_95", upper_bound(r.counts.unbalanced, r.counts.rays)},
                                  {"promised_zero", r.must_be_zero}});
     }
+    for (const CullRow& r : report.culls) {
+        json["culls"].push_back({{"mesh", r.mesh}, {"place", r.place}, {"rays", r.rays}, {"culled", r.culls}});
+    }
     for (const ExactRow& r : report.exact) {
         json["exact"].push_back({{"scene", r.scene}, {"rays", r.rays}, {"hits", r.hits}, {"missed", r.missed},
                                  {"invented", r.invented}, {"wrong", r.wrong}, {"ties", r.ties},
@@ -102,8 +115,9 @@ bool verdict(const Report& report) {
         total += r.counts.unbalanced;
         if (r.must_be_zero) broken += r.counts.unbalanced;
     }
+    for (const CullRow& r : report.culls) broken += r.culls;
     if (report.variant == Variant::Watertight && broken) {
-        std::fprintf(stderr, "rtc-accuracy: error: watertight: %llu unbalanced rays where none are promised\n",
+        std::fprintf(stderr, "rtc-accuracy: error: watertight: %llu leaks, double hits or false culls where none are promised\n",
                      (unsigned long long)broken);
         return false;
     }
@@ -118,13 +132,14 @@ int run(int argc, char** argv) {
     CLI::App app{"Measures leaks, exactness and cost of rtc's traversal on a device."};
     std::vector<std::string> tiers = {"watertight"}, axes = {"mesh"};
     std::string device, json_path, markdown_path;
-    uint64_t rays = 1 << 17, exact_rays = 0, cost_rays = 0;
+    uint64_t rays = 1 << 17, exact_rays = 0, cost_rays = 0, cull_rays = 0;
     bool validate = false, while_while = false, storage = false;
     uint32_t shared_stack = 0;
     app.add_option("--tier", tiers, "watertight, fast, contracted (the negative control) or all")->delimiter(',');
     app.add_option("--device", device, "device index or part of its name");
     app.add_option("--axes", axes, "mesh, offset, size, aspect, distance, transform, zeros, all or none")->delimiter(',');
     app.add_option("--rays", rays, "rays per point and aim");
+    app.add_option("--culls", cull_rays, "rays per place for false box culls");
     app.add_option("--exact", exact_rays, "rays per scene against exact arithmetic");
     app.add_option("--cost", cost_rays, "rays per workload for timing");
     app.add_option("--json", json_path, "write all figures");
@@ -160,7 +175,8 @@ int run(int argc, char** argv) {
             std::printf("%s: skipped, the device has no Float64\n", tier.c_str());
             continue;
         }
-        Report report{options.variant, {}, {}, {}};
+        Report report;
+        report.variant = options.variant;
         DeviceTracer tracer(context, options);
         if (cost_rays) {
             // As a pipeline without any-hit and intersection shaders would have it.
@@ -170,6 +186,7 @@ int run(int argc, char** argv) {
             measure_cost(lean_tracer, cost_rays, report.cost);
         }
         for (const std::string& axis : axes) measure_axis(tracer, axis, rays, report.leaks);
+        if (cull_rays) measure_culls(tracer, cull_rays, report.culls);
         if (exact_rays) measure_exact(tracer, exact_rays, report.exact);
         const std::string tables = markdown(report, name);
         std::fputs(tables.c_str(), stdout);

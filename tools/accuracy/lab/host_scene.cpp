@@ -41,6 +41,17 @@ struct Child {
     uint32_t reference = RTC_REF_EMPTY;
 };
 
+Bounds inflated(Bounds b, const Bounds& whole, float by) {
+    if (by == 0 || b.empty()) return b;
+    float size = 0;
+    for (int i = 0; i < 3; ++i) size = std::max(size, whole.max[i] - whole.min[i]);
+    for (int i = 0; i < 3; ++i) {
+        b.min[i] -= by * size;
+        b.max[i] += by * size;
+    }
+    return b;
+}
+
 struct Builder {
     const std::vector<Bounds>& bounds;
     uint32_t leaf_size;
@@ -137,7 +148,7 @@ struct Heap {
 };
 
 void write_header(Heap& heap, uint32_t base, uint32_t kind, uint32_t facts, const Builder& builder,
-                  const Bounds& bounds, size_t slot_count, size_t primitives, uint32_t quads) {
+                  const Bounds& bounds, size_t slot_count, size_t primitives, uint32_t quads, float inflate) {
     uint32_t* h = heap.at(base);
     h[RTC_HDR_SELF_LO] = base;
     h[RTC_HDR_MAGIC] = RTC_AS_MAGIC;
@@ -161,8 +172,9 @@ void write_header(Heap& heap, uint32_t base, uint32_t kind, uint32_t facts, cons
     for (const auto& node : builder.nodes) {
         for (int c = 0; c < 2; ++c) {
             for (int i = 0; i < 3; ++i) {
-                n[c * 8 + i] = bits(node[c].bounds.min[i]);
-                n[c * 8 + 4 + i] = bits(node[c].bounds.max[i]);
+                const Bounds b = inflated(node[c].bounds, bounds, inflate);
+                n[c * 8 + i] = bits(b.min[i]);
+                n[c * 8 + 4 + i] = bits(b.max[i]);
             }
         }
         n[3] = node[0].reference;
@@ -217,7 +229,7 @@ Built build_blas(Heap& heap, const Blas& blas, const BuildOptions& options) {
         RTC_AS_HEADER_QUADS + builder.nodes.size() * RTC_NODE_QUADS + builder.order.size() * slot_quads;
     built.base = heap.allocate(quads);
     write_header(heap, built.base, RTC_AS_KIND_BOTTOM, built.facts, builder, built.bounds, builder.order.size(),
-                 primitives.size(), uint32_t(quads));
+                 primitives.size(), uint32_t(quads), options.inflate);
     uint32_t* slot = heap.at(built.base + heap.at(built.base)[RTC_HDR_SLOTS]);
     for (uint32_t p : builder.order) {
         const Primitive primitive = primitives[p];
@@ -240,34 +252,33 @@ Built build_blas(Heap& heap, const Blas& blas, const BuildOptions& options) {
     return built;
 }
 
-// World bounds of an instance, widened as abi.h and traversal.md R4 ask of
-// builders, in double with one outward rounding at the end. The second term
-// covers what the object-space ray loses in transforms that stretch: |M||W|
-// is 3 or less for what traversal pads by itself.
+// World bounds of an instance, widened as the runtime's build kernels do
+// (leaf_instances.comp), in double with one outward rounding at the end.
 Bounds instance_bounds(const Bounds& object, const Transform& m, const Transform& w) {
     Bounds world;
     const double u = std::ldexp(1.0, -24);
-    double widest = 0;
-    double low[3], high[3], slack[3];
+    double size[3], back[3];
     for (int r = 0; r < 3; ++r) {
-        low[r] = high[r] = m[r][3];
-        slack[r] = std::fabs(m[r][3]);
+        size[r] = std::fabs(m[r][3]);
         for (int c = 0; c < 3; ++c) {
-            const double a = double(m[r][c]) * object.min[c], b = double(m[r][c]) * object.max[c];
-            low[r] += std::min(a, b);
-            high[r] += std::max(a, b);
-            slack[r] += std::max(std::fabs(a), std::fabs(b));
+            size[r] += std::fabs(m[r][c]) * std::max(std::fabs(object.min[c]), std::fabs(object.max[c]));
         }
-        widest = std::max({widest, std::fabs(low[r]), std::fabs(high[r])});
     }
     for (int r = 0; r < 3; ++r) {
-        double stretch = 0;
-        for (int k = 0; k < 3; ++k) {
-            for (int c = 0; c < 3; ++c) stretch += std::fabs(double(m[r][c]) * w[c][k]);
+        back[r] = 0;
+        for (int c = 0; c < 3; ++c) back[r] += std::fabs(w[r][c]) * size[c];
+    }
+    for (int r = 0; r < 3; ++r) {
+        double low = m[r][3], high = m[r][3], stretched = 0;
+        for (int c = 0; c < 3; ++c) {
+            const double a = double(m[r][c]) * object.min[c], b = double(m[r][c]) * object.max[c];
+            low += std::min(a, b);
+            high += std::max(a, b);
+            stretched += std::fabs(m[r][c]) * back[c];
         }
-        const double pad = 4 * u * slack[r] + (stretch > 3 ? 64 * u * stretch * widest : 0);
-        world.min[r] = std::nextafter(float(low[r] - pad), -INFINITY);
-        world.max[r] = std::nextafter(float(high[r] + pad), INFINITY);
+        const double pad = (8 * size[r] + 4 * stretched) * u;
+        world.min[r] = std::nextafter(float(low - pad), -INFINITY);
+        world.max[r] = std::nextafter(float(high + pad), INFINITY);
     }
     return world;
 }
@@ -345,7 +356,7 @@ HostScene build_scene(const std::vector<Blas>& blases, const std::vector<Instanc
         RTC_AS_HEADER_QUADS + builder.nodes.size() * RTC_NODE_QUADS + instances.size() * RTC_INSTANCE_QUADS;
     scene.root = heap.allocate(quads);
     write_header(heap, scene.root, RTC_AS_KIND_TOP, 0, builder, world, instances.size(), instances.size(),
-                 uint32_t(quads));
+                 uint32_t(quads), options.inflate);
     uint32_t* record = heap.at(scene.root + heap.at(scene.root)[RTC_HDR_SLOTS]);
     for (size_t i = 0; i < instances.size(); ++i) {
         const Instance& instance = instances[i];

@@ -46,6 +46,7 @@ struct Instance {
 struct BuildOptions {
     uint32_t leaf_size = 4;
     bool chain = false;  // one primitive split off per level: the deepest tree of its size
+    float inflate = 0;   // boxes grow by this much of the structure's size: a tree that culls nothing near
 };
 
 // Heap words of a scene; quad `root` is the top level.

@@ -28,10 +28,10 @@ void LeakCounts::add(const LeakCounts& more) {
     seconds += more.seconds;
 }
 
-HostScene leak_scene(const LeakCase& c) {
+HostScene leak_scene(const LeakCase& c, const BuildOptions& options) {
     Instance instance = c.instance;
     instance.blas = 0;
-    return build_scene({Blas{{{c.mesh->soup(), {}, false}}}}, {instance});
+    return build_scene({Blas{{{c.mesh->soup(), {}, false}}}}, {instance}, options);
 }
 
 std::vector<Ray> leak_rays(const LeakCase& c, uint64_t count, uint64_t batch) {
@@ -88,6 +88,25 @@ LeakCounts count_leaks(DeviceTracer& tracer, const LeakCase& c, uint64_t total) 
         counts.seconds += tracer.seconds;
     }
     return counts;
+}
+
+uint64_t count_false_culls(DeviceTracer& tracer, const LeakCase& c, uint64_t total) {
+    uint64_t culls = 0, done = 0;
+    BuildOptions generous;
+    generous.inflate = 0.05f;
+    const HostScene tight = leak_scene(c), loose = leak_scene(c, generous);
+    for (uint64_t batch = 0; done < total; ++batch) {
+        const std::vector<Ray> rays = leak_rays(c, std::min(kBatch, total - done), batch);
+        tracer.set_scene(tight);
+        const auto seen = tracer.trace(rays);
+        tracer.set_scene(loose);
+        const auto there = tracer.trace(rays);
+        for (size_t i = 0; i < rays.size(); ++i) {
+            culls += seen[i].front != there[i].front || seen[i].back != there[i].back;
+        }
+        done += rays.size();
+    }
+    return culls;
 }
 
 }  // namespace rtc::lab

@@ -38,6 +38,10 @@ struct LeakCounts {
 LeakCounts count_leaks(DeviceTracer& tracer, const LeakCase& c, uint64_t rays);
 std::vector<Ray> leak_rays(const LeakCase& c, uint64_t rays, uint64_t batch);
 
-HostScene leak_scene(const LeakCase& c);
+HostScene leak_scene(const LeakCase& c, const BuildOptions& options = {});
+
+// False box culls: rays that see other candidates once every box of both
+// levels is generously inflated. Sets the tracer's scene.
+uint64_t count_false_culls(DeviceTracer& tracer, const LeakCase& c, uint64_t rays);
 
 }  // namespace rtc::lab

@@ -149,6 +149,21 @@ IndexedMesh make_cube_grid(uint32_t n) {
     return mesh;
 }
 
+IndexedMesh make_plane(uint32_t n) {
+    IndexedMesh mesh{"plane", {}, {}};
+    for (uint32_t i = 0; i <= n; ++i) {
+        for (uint32_t j = 0; j <= n; ++j) mesh.vertices.push_back(rounded({2.0 * i / n - 1, 2.0 * j / n - 1, 0}));
+    }
+    for (uint32_t i = 0; i < n; ++i) {
+        for (uint32_t j = 0; j < n; ++j) {
+            const uint32_t a = i * (n + 1) + j, b = a + n + 1;
+            mesh.triangles.push_back({a, b, b + 1});
+            mesh.triangles.push_back({a, b + 1, a + 1});
+        }
+    }
+    return mesh;
+}
+
 IndexedMesh moved(const IndexedMesh& mesh, double scale, const std::array<double, 3>& offset) {
     IndexedMesh out = mesh;
     for (Vec3& v : out.vertices) {

@@ -24,6 +24,8 @@ IndexedMesh make_torus_knot(uint32_t along, uint32_t around);
 IndexedMesh make_slivers(uint32_t count, double ratio);
 // A cube whose faces are n x n grids: rays along the axes meet its edges and vertices exactly.
 IndexedMesh make_cube_grid(uint32_t n);
+// Flat, in the plane z = 0: the thinnest boxes there are. Open.
+IndexedMesh make_plane(uint32_t n);
 
 // Vertices times `scale` plus `offset`, rounded once. The mesh stays closed:
 // shared vertices move together.
