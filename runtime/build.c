@@ -309,7 +309,7 @@ VkResult rtrCmdBuildAccelerationStructure(RtrRecorder recorder, const VkAccelera
     b.push.facts = (dst->aabbs ? RTC_FACT_AABBS : 0u) | (opaque ? RTC_FACT_ALL_OPAQUE : 0u);
     if (update) {
         rtr_update_scratch(dst->primitive_count, dst->geometry_count, &b.layout);
-        return rtr_error(b.device, VK_ERROR_FEATURE_NOT_PRESENT, "update", "update is not implemented yet");
+        return rtr_record_update(&b, src);
     }
     rtr_build_scratch(dst->primitive_count, &b.layout);
     return record_build(&b);

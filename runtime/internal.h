@@ -88,6 +88,12 @@ bool rtr_load_device_table(const RtrInstanceTable* instance, VkDevice device, Rt
     X(encode_triangles) \
     X(encode_aabbs)     \
     X(header)           \
+    X(copy)             \
+    X(property)         \
+    X(refit_links)      \
+    X(refit_triangles)  \
+    X(refit_aabbs)      \
+    X(refit_nodes)      \
     X(finish_launch)    \
     X(probe)
 
