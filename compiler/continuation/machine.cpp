@@ -126,10 +126,18 @@ void Machine::import_traversal(const ir::Module& traversal, bool with_any_hit, b
             }
     }
 
-    // glslang passes `in` parameters through pointers to copies. Exported functions take values
-    // instead, so that they can be called from anywhere without temporaries.
+    // glslang passes `in` parameters through pointers to copies. The functions states call take values
+    // instead, so that they can be called from anywhere without temporaries. (Others may have `out`
+    // parameters and stay as they are.)
+    static const char* const kCalled[] = {
+        "rtc_report_begin",      "rtc_object_to_world",      "rtc_world_to_object",   "rtc_instance_custom_index",
+        "rtc_object_ray_origin", "rtc_object_ray_direction", "rtc_sbt_raygen_word",   "rtc_sbt_miss_word",
+        "rtc_sbt_hit_word",      "rtc_sbt_callable_word",    "rtc_miss_record",       "rtc_hit_record_base",
+        "rtc_callable_record",   "rtc_error",                "rtc_scratch_load",      "rtc_scratch_store",
+        "rtc_trace_save",        "rtc_trace_restore"};
     std::map<Id, std::vector<Id>> by_value;  // function -> parameter value types
-    for (const auto& [name, id] : exports_)
+    for (const char* name : kCalled) {
+        const Id id = function(name);
         for (Function& function : traversal_functions) {
             if (function.id() != id || function.params.empty()) continue;
             std::vector<Id> types;
@@ -156,6 +164,7 @@ void Machine::import_traversal(const ir::Module& traversal, bool with_any_hit, b
             function.def.ops[1] = p.function_type(function.def.type, types);
             by_value[id] = types;
         }
+    }
     for (Function& function : traversal_functions)
         for (Block& block : function.blocks) {
             std::vector<Inst> out;
