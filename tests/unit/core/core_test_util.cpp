@@ -102,7 +102,7 @@ std::string trace_text(const std::string& flags, const std::string& mask, const 
 std::string stage_text(const StageText& parts) {
     return "OpCapability RayTracingNV\n" + parts.preamble + R"(OpExtension "SPV_NV_ray_tracing"
 OpMemoryModel Logical GLSL450
-OpEntryPoint )" + parts.model + R"( %main "main"
+OpEntryPoint )" + parts.model + R"( %main "main" )" + parts.interface + R"(
 OpDecorate %scene DescriptorSet 0
 OpDecorate %scene Binding 0
 )" + parts.annotations + R"(

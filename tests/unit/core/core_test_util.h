@@ -37,7 +37,8 @@ void expect_clear_error(const LinkResult& result, const std::string& what);
 struct StageText {
     std::string model = "RayGenerationNV";
     std::string globals, body, annotations, functions;
-    std::string preamble;  // further capabilities and extensions
+    std::string preamble;   // further capabilities and extensions
+    std::string interface;  // ids of the entry point's input variables
 };
 std::string stage_text(const StageText& parts);
 std::string raygen_text(const std::string& globals, const std::string& body, const std::string& annotations = "",
