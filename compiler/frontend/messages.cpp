@@ -52,7 +52,7 @@ bool is_consequence(const Diagnostic& message, const std::vector<Diagnostic>& ea
         if (unknown && contains(message.text, "swizzle")) return true;
         if (other.line != message.line) continue;
         if (other.text == message.text) return true;
-        if (unknown && (starts_with(message.text, "'assign'") ||
+        if (unknown && (contains(message.text, "cannot convert") ||
                         (starts_with(message.text, other.text.substr(0, other.text.find(" :"))) &&
                          contains(message.text, "undeclared identifier"))))
             return true;

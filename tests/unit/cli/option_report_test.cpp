@@ -71,15 +71,20 @@ TEST_F(Report, ReportSaysStatesAndTraceSites) {
     EXPECT_THAT(run.out, HasSubstr("camera.rgen:21: trace, "));
 }
 
+// Ray generation keeps its variables in registers; a closest-hit that traces has a frame.
 TEST_F(Report, ReportNamesWhatIsSaved) {
-    write("live.rgen", raygen_shader("    vec4 kept = imageSize(image).xyxy * color;\n"
-                                     "    traceNV(scene, 0, 0xff, 0, 0, 0, vec3(1.0), 0.0, vec3(0, 1, 0), 1e9, 0);\n"
-                                     "    imageStore(image, ivec2(0), kept + color);\n"));
-    write("a.rmiss", miss_shader());
-    const CliRun run = rtc("live.rgen a.rmiss --report -o out.spv");
+    write("again.rchit", "#version 460\n#extension GL_NV_ray_tracing : require\n"
+                         "layout(set = 0, binding = 0) uniform accelerationStructureNV scene;\n"
+                         "layout(location = 0) rayPayloadInNV vec4 color;\n"
+                         "layout(location = 1) rayPayloadNV vec4 inner;\n"
+                         "void main() {\n"
+                         "    vec2 kept = gl_WorldRayDirectionNV.xy * gl_HitTNV;\n"
+                         "    traceNV(scene, 0, 0xff, 0, 0, 0, vec3(1.0), 0.0, vec3(0, 1, 0), 1e9, 1);\n"
+                         "    color = inner + kept.xyxy;\n}\n");
+    const CliRun run = rtc("camera.rgen sky.rmiss again.rchit --max-recursion-depth=2 --report -o out.spv");
     EXPECT_EQ(run.status, 0) << run.err;
-    EXPECT_THAT(run.out, HasSubstr("live.rgen:7: trace, "));
-    EXPECT_THAT(run.out, HasSubstr("live.rgen:10: trace, 16 bytes: kept"));
+    EXPECT_THAT(run.out, HasSubstr("camera.rgen:21: trace, 0 bytes\n"));
+    EXPECT_THAT(run.out, ::testing::ContainsRegex("again.rchit:8: trace, [1-9][0-9]* bytes: .*kept"));
 }
 
 TEST_F(Report, ReportOfAFinishedModule) {
