@@ -107,6 +107,16 @@ TEST(Diagnostics, TracesThatCannotHit) {
     expect_warning(trace("%uint_0", "%uint_255", "%uint_9", "%uint_0"), "sbt-offset-range");
 }
 
+TEST(Diagnostics, PayloadTypes) {
+    const LinkResult result = link({{StageKind::RayGen, module_of(tracing_raygen())},
+                                    {StageKind::Miss, module_of(stage("MissNV",
+                                                                      "%pi = OpTypePointer IncomingRayPayloadNV %v3float\n"
+                                                                      "%p = OpVariable %pi IncomingRayPayloadNV\n",
+                                                                      "OpStore %p %zero3\n"))}});
+    EXPECT_TRUE(result.ok) << describe(result);
+    EXPECT_TRUE(has_diagnostic(result, "payload-mismatch", Severity::Warning)) << describe(result);
+}
+
 // ---- what ray tracing shaders cannot have, or rtc not yet ----
 
 StageText reading_input(const std::string& decoration) {
