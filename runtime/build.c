@@ -8,9 +8,8 @@ static void place(RtrScratchLayout* l, uint32_t array, VkDeviceSize size) {
 }
 
 void rtr_build_scratch(uint32_t n, RtrScratchLayout* l) {
-    VkDeviceSize sort_blocks = rtr_groups(n, RTR_SORT_BLOCK), groups = rtr_groups(n, RTR_GROUP);
-    VkDeviceSize sums = sort_blocks * RTR_SORT_BINS;
-    if (sums < 2 * groups) sums = 2 * groups;
+    /* The scans of the numbering need two words for blocks of the same size. */
+    VkDeviceSize sums = (VkDeviceSize)rtr_groups(n, RTR_SORT_BLOCK) * RTR_SORT_BINS;
     memset(l, 0, sizeof *l);
     place(l, RTR_ARR_STATE, 4 * (RTR_ST_SUMS + sums));
     place(l, RTR_ARR_LEAF_BOX, 32ull * n);
@@ -95,13 +94,6 @@ void rtr_dispatch(RtrBuild* b, RtrKernel kernel, uint64_t groups) {
     rtr_compute_barrier(b->recorder);
 }
 
-void rtr_dispatch_indirect(RtrBuild* b, RtrKernel kernel, uint32_t state_word) {
-    set_kernel(b, kernel);
-    b->device->vk.CmdDispatchIndirect(b->recorder->cmd, b->scratch,
-                                      b->scratch_offset + b->layout.offset[RTR_ARR_STATE] + 4ull * state_word);
-    rtr_compute_barrier(b->recorder);
-}
-
 static VkResult emit_leaves(RtrBuild* b) {
     RtrKernel kernel = RTR_KERNEL_leaf_triangles;
     if (b->push.flags & RTR_BUILD_AABBS) kernel = RTR_KERNEL_leaf_aabbs;
@@ -135,44 +127,20 @@ static void sort(RtrBuild* b) {
     }
 }
 
-static void lbvh(RtrBuild* b) {
-    uint32_t groups = rtr_groups(b->primitives, RTR_GROUP);
+/* Passes that rotate; more gain less than a percent each (kernels/lbvh_fit.comp). */
+#define ROTATION_PASSES 3u
+
+static void tree(RtrBuild* b) {
+    const uint32_t groups = rtr_groups(b->primitives, RTR_GROUP);
+    const uint32_t passes = (b->push.build_flags & VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_BUILD_BIT_NV) ? 1 : ROTATION_PASSES;
+    uint32_t pass;
     rtr_dispatch(b, RTR_KERNEL_lbvh_topology, groups);
-    rtr_dispatch(b, RTR_KERNEL_lbvh_fit, groups);
+    b->push.step = passes > 1;
+    for (pass = 0; pass < passes; pass++) rtr_dispatch(b, RTR_KERNEL_lbvh_fit, groups);
     b->push.blocks = rtr_groups(b->primitives, RTR_SCAN_BLOCK);
     rtr_dispatch(b, RTR_KERNEL_number_count, b->push.blocks);
     rtr_dispatch(b, RTR_KERNEL_number_scan, 1);
     rtr_dispatch(b, RTR_KERNEL_number, b->push.blocks);
-}
-
-/* Iterations by search, and by force until RTR_PLOC_FINAL clusters are left for certain. */
-static void ploc_plan(uint32_t n, uint32_t* searched, uint32_t* forced) {
-    uint32_t count;
-    *searched = *forced = 0;
-    /* Measured: an iteration leaves 72 to 80 % of the clusters. */
-    for (count = n; count > RTR_PLOC_FINAL; count = (uint32_t)((uint64_t)count * 4 / 5)) ++*searched;
-    for (count = n; count > RTR_PLOC_FINAL; count = count / 2 + count % 2) ++*forced;
-}
-
-static void ploc(RtrBuild* b) {
-    uint32_t searched, forced, it;
-    ploc_plan(b->primitives, &searched, &forced);
-    b->push.window_count = RTC_MAX_DEPTH - 8 - forced; /* see kernels/ploc.glsl */
-    rtr_dispatch(b, RTR_KERNEL_ploc_init, rtr_groups(b->primitives, RTR_GROUP));
-    for (it = 0; it < searched + forced; it++) {
-        b->push.step = it;
-        b->push.blocks = it >= searched;
-        rtr_dispatch_indirect(b, RTR_KERNEL_ploc_search, RTR_ST_ITER + it * RTR_ITER_WORDS);
-        rtr_dispatch(b, RTR_KERNEL_ploc_scan, 1);
-        rtr_dispatch_indirect(b, RTR_KERNEL_ploc_merge, RTR_ST_ITER + it * RTR_ITER_WORDS);
-    }
-    b->push.step = it;
-    b->push.blocks = 56; /* then 8 by force */
-    rtr_dispatch(b, RTR_KERNEL_ploc_final, 1);
-    while (it-- > 0) {
-        b->push.step = it;
-        rtr_dispatch_indirect(b, RTR_KERNEL_ploc_down, RTR_ST_LEVEL + 4 * it);
-    }
 }
 
 static VkResult record_build(RtrBuild* b) {
@@ -184,11 +152,7 @@ static VkResult record_build(RtrBuild* b) {
     if (b->primitives) {
         rtr_dispatch(b, RTR_KERNEL_morton, groups);
         sort(b);
-        if (b->push.flags & RTR_BUILD_PLOC) {
-            ploc(b);
-        } else {
-            lbvh(b);
-        }
+        tree(b);
     }
     for (at = 0; at < rtr_node_room(b->primitives); at += b->node_window) {
         if ((r = rtr_bind_arrays(b, at, 0)) != VK_SUCCESS) return r;
@@ -205,8 +169,6 @@ static VkResult record_build(RtrBuild* b) {
         }
     }
     rtr_dispatch(b, RTR_KERNEL_header, 1);
-    /* The next build may write this scratch again after a barrier on compute alone. */
-    rtr_barrier(b->recorder, VK_PIPELINE_STAGE_DRAW_INDIRECT_BIT, 0, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, 0);
     return VK_SUCCESS;
 }
 
@@ -303,7 +265,6 @@ VkResult rtrCmdBuildAccelerationStructure(RtrRecorder recorder, const VkAccelera
     b.push.geometry_count = info->geometryCount;
     if (dst->type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV) b.push.flags |= RTR_BUILD_TOP;
     if (dst->aabbs) b.push.flags |= RTR_BUILD_AABBS;
-    if (!(info->flags & VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_BUILD_BIT_NV)) b.push.flags |= RTR_BUILD_PLOC;
     if (info->flags & VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV) b.push.flags |= RTR_BUILD_KEEP_DEGENERATE;
     for (g = 0; g < info->geometryCount; g++) opaque = opaque && (info->pGeometries[g].flags & VK_GEOMETRY_OPAQUE_BIT_NV);
     b.push.facts = (dst->aabbs ? RTC_FACT_AABBS : 0u) | (opaque ? RTC_FACT_ALL_OPAQUE : 0u);

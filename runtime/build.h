@@ -29,7 +29,6 @@ VkResult rtr_check_geometry(RtrDevice d, const VkGeometryNV* g, unsigned index, 
  * arrays of size 0 in the layout are left out. */
 VkResult rtr_bind_arrays(RtrBuild* b, uint32_t nodes_at, uint32_t slots_at);
 void rtr_dispatch(RtrBuild* b, RtrKernel kernel, uint64_t groups);
-void rtr_dispatch_indirect(RtrBuild* b, RtrKernel kernel, uint32_t state_word);
 
 /* Calls `emit` for every piece of the inputs that one set of bindings reaches, with set 0
  * bound and the push constants of the piece filled in. */

@@ -78,12 +78,6 @@ bool rtr_load_device_table(const RtrInstanceTable* instance, VkDevice device, Rt
     X(number_count)     \
     X(number_scan)      \
     X(number)           \
-    X(ploc_init)        \
-    X(ploc_search)      \
-    X(ploc_scan)        \
-    X(ploc_merge)       \
-    X(ploc_final)       \
-    X(ploc_down)        \
     X(encode_nodes)     \
     X(encode_triangles) \
     X(encode_aabbs)     \

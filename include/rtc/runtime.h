@@ -316,7 +316,8 @@ RTR_API VkResult rtrResetRecorder(RtrRecorder recorder);
  * Synchronisation is the application's, as in Vulkan: reads of inputs and reads and
  * writes of `dst` and scratch happen in COMPUTE_SHADER with SHADER_READ / SHADER_WRITE
  * (rtrTranslatePipelineStages/Access of the NV masks say the same).
- * PREFER_FAST_BUILD takes a Morton tree; otherwise a PLOC tree of near-SAH quality.
+ * PREFER_FAST_BUILD takes a Morton tree as it is; otherwise three passes of rotations bring
+ * it near a SAH tree.
  * Errors: VALIDATION_FAILED (counts above those of creation, unbound objects, update
  * without ALLOW_UPDATE or with changed geometry, misaligned offsets);
  * FEATURE_NOT_PRESENT naming the device limit an input exceeds. */

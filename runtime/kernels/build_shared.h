@@ -21,14 +21,14 @@
 
 #define RTR_ARR_STATE 0u    /* RTR_ST_* words, then block sums and histograms */
 #define RTR_ARR_LEAF_BOX 1u /* by primitive: min.xyz, active (0/1 as float); max.xyz, 0 */
-#define RTR_ARR_NODE_BOX 2u /* by inner node: min.xyz, SAH cost; max.xyz, inner count | height << 26 */
+#define RTR_ARR_NODE_BOX 2u /* by inner node: min.xyz, SAH cost; max.xyz, height | encoded height << 8 */
 #define RTR_ARR_INFO 3u     /* by inner node: left, right, first slot, primitives | collapsed << 31 */
 #define RTR_ARR_PAIRS_A 4u  /* (Morton code, primitive), sorted after the sort */
 #define RTR_ARR_PAIRS_B 5u
-#define RTR_ARR_LINKS 6u    /* LBVH: parents (inner, then leaves); PLOC: two cluster lists */
-#define RTR_ARR_MARKS 7u    /* LBVH: arrival counters; PLOC: neighbour and role; refit: arrivals */
+#define RTR_ARR_LINKS 6u    /* parents: of inner nodes, then of leaves by sorted position */
+#define RTR_ARR_MARKS 7u    /* arrivals at inner nodes */
 #define RTR_ARR_OUT 8u      /* by inner node: index of the encoded node */
-#define RTR_ARR_SLOT_OF 9u  /* by primitive: its slot */
+#define RTR_ARR_SLOT_OF 9u  /* by primitive: sorted position, in the end its slot */
 #define RTR_ARR_DST_NODES 10u
 #define RTR_ARR_DST_SLOTS 11u
 #define RTR_ARR_DST_HEADER 12u
@@ -37,8 +37,8 @@
 /* Children of INFO: RTR_CHILD_LEAF | primitive, or an inner node. */
 #define RTR_CHILD_LEAF 0x80000000u
 #define RTR_COLLAPSED 0x80000000u
-#define RTR_HEIGHT_SHIFT 26u
-#define RTR_INNER_MASK 0x03ffffffu
+#define RTR_HEIGHT_MASK 0xffu
+#define RTR_ENCODED_SHIFT 8u
 
 /* State words. Floats that are reduced with atomics are order-preserving uints. */
 #define RTR_ST_CENTER_MIN 0u /* 3: bounds of (min + max) of the active boxes */
@@ -49,14 +49,7 @@
 #define RTR_ST_HAS 9u      /* RTC_FACT_HAS_* */
 #define RTR_ST_NODES 10u   /* encoded nodes */
 #define RTR_ST_ROOT 11u    /* inner node that is the root */
-#define RTR_ST_ITER 64u    /* PLOC: RTR_ITER_WORDS words per iteration, up to 104 of them */
-#define RTR_ITER_WORDS 8u
-#define RTR_ITER_ARGS 0u   /* groups x, y, z of search and merge */
-#define RTR_ITER_COUNT 3u  /* clusters */
-#define RTR_ITER_PARITY 4u /* which cluster list */
-#define RTR_ITER_NODES 5u  /* inner nodes made before this iteration */
-#define RTR_ST_LEVEL 1024u  /* PLOC: 4 words per iteration: dispatch args of its top-down pass */
-#define RTR_ST_SUMS 1536u  /* block sums and histograms start here */
+#define RTR_ST_SUMS 64u  /* block sums and histograms start here */
 
 #define RTR_SORT_ITEMS 8u
 #define RTR_SORT_BLOCK (RTR_GROUP * RTR_SORT_ITEMS)
@@ -64,9 +57,6 @@
 #define RTR_SORT_BINS 16u
 #define RTR_SCAN_ITEMS 8u
 #define RTR_SCAN_BLOCK (RTR_GROUP * RTR_SCAN_ITEMS)
-
-#define RTR_PLOC_RADIUS 8u
-#define RTR_PLOC_FINAL RTR_GROUP /* clusters the one-workgroup kernel finishes */
 
 #define RTR_INACTIVE_KEY 0x7fffffffu
 
@@ -77,7 +67,6 @@
 #define RTR_BUILD_TOP 1u
 #define RTR_BUILD_AABBS 2u
 #define RTR_BUILD_KEEP_DEGENERATE 4u /* ALLOW_UPDATE: only NaN drops a primitive */
-#define RTR_BUILD_PLOC 8u
 #define RTR_BUILD_HAS_TRANSFORM 16u
 
 struct RtrBuildPush {
@@ -93,7 +82,7 @@ struct RtrBuildPush {
     RTR_UINT index_type;
     RTR_UINT transform_offset; /* bytes into RTR_IN_TRANSFORM */
     RTR_UINT flags;          /* RTR_BUILD_* */
-    RTR_UINT step;           /* sort: bit shift; PLOC: iteration; final: iterations left */
+    RTR_UINT step;           /* sort: bit shift; fit: rotate; others: see the kernel */
     RTR_UINT blocks;
     RTR_UINT window_first;   /* first node or slot of the window */
     RTR_UINT window_count;

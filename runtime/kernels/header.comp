@@ -11,7 +11,7 @@ void main() {
     bool top = (p.flags & RTR_BUILD_TOP) != 0u;
     uint nodes = n < 2u ? 1u : state[RTR_ST_NODES];
     uint slots = top ? p.total : n;
-    uint depth = n < 2u ? 1u : floatBitsToUint(node_box[2u * root + 1u].w) >> RTR_HEIGHT_SHIFT;
+    uint depth = n < 2u ? 1u : (floatBitsToUint(node_box[2u * root + 1u].w) >> RTR_ENCODED_SHIFT) & RTR_HEIGHT_MASK;
     vec3 lo = vec3(RTR_FLT_MAX), hi = vec3(-RTR_FLT_MAX);
     if (n == 1u) {
         uint prim = pairs_a[0].y;

@@ -1,36 +1,73 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// LBVH: encoded index of each surviving inner node, in Morton order; the root gets 0.
+// Encoded index of each surviving inner node, in Morton order (the root gets 0), and the
+// slots of the leaves that hang on it.
 #include "common.glsl"
 #include "survive.glsl"
 
 shared uint sums[256];
+shared uint slot_sums[256];
+
+// The primitives of a collapsed subtree, at most RTC_MAX_LEAF_SLOTS, from slot `at` on.
+void place_leaf(uint node, uint at) {
+    info[node].z = at;
+    uint stack[4];
+    stack[0] = node;
+    uint top = 1u;
+    for (uint turn = 0u; turn < 8u && top != 0u; turn++) {
+        uint child = stack[--top];
+        if ((child & RTR_CHILD_LEAF) != 0u) {
+            slot_of[child & ~RTR_CHILD_LEAF] = at++;
+        } else {
+            stack[top++] = info[child].y;
+            stack[top++] = info[child].x;
+        }
+    }
+}
 
 void main() {
     uint lane = gl_LocalInvocationIndex;
     uint first = group_index() * RTR_SCAN_BLOCK + lane * RTR_SCAN_ITEMS;
     bool alive[RTR_SCAN_ITEMS];
-    uint own = 0u;
+    uint own = 0u, own_s = 0u;
     for (uint k = 0u; k < RTR_SCAN_ITEMS; k++) {
         alive[k] = survives(first + k);
-        own += alive[k] ? 1u : 0u;
+        if (alive[k]) {
+            own++;
+            own_s += own_slots(first + k);
+        }
     }
     sums[lane] = own;
+    slot_sums[lane] = own_s;
     barrier();
     for (uint d = 1u; d < RTR_GROUP; d <<= 1u) {
         uint v = lane >= d ? sums[lane - d] : 0u;
+        uint w = lane >= d ? slot_sums[lane - d] : 0u;
         barrier();
         sums[lane] += v;
+        slot_sums[lane] += w;
         barrier();
     }
     if (group_index() >= p.blocks) return;
     uint at = state[RTR_ST_SUMS + group_index()] + sums[lane] - own;
+    uint slot = state[RTR_ST_SUMS + p.blocks + group_index()] + slot_sums[lane] - own_s;
     for (uint k = 0u; k < RTR_SCAN_ITEMS; k++) {
+        uint node = first + k;
         if (alive[k]) {
-            out_index[first + k] = at;
+            out_index[node] = at;
             at++;
-        } else if (first + k + 1u < state[RTR_ST_ACTIVE]) {
-            out_index[first + k] = 0xffffffffu;
+            for (uint c = 0u; c < 2u; c++) {
+                uint child = info[node][c];
+                if ((child & RTR_CHILD_LEAF) != 0u) {
+                    slot_of[child & ~RTR_CHILD_LEAF] = slot;
+                    slot++;
+                } else if ((info[child].w & RTR_COLLAPSED) != 0u) {
+                    place_leaf(child, slot);
+                    slot += info[child].w & ~RTR_COLLAPSED;
+                }
+            }
+        } else if (node + 1u < state[RTR_ST_ACTIVE]) {
+            out_index[node] = 0xffffffffu;
         }
     }
 }

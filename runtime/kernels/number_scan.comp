@@ -5,5 +5,6 @@
 
 void main() {
     uint total = scan_words(RTR_ST_SUMS, p.blocks);
+    scan_words(RTR_ST_SUMS + p.blocks, p.blocks);
     if (gl_LocalInvocationIndex == 0u) state[RTR_ST_NODES] = total;
 }

@@ -1,22 +1,23 @@
-// An inner node from its two children, with the choice between keeping the split and
-// collapsing the subtree into one leaf, by the surface area heuristic.
+// Inner nodes from their children, by the surface area heuristic (SAH).
 struct Subtree {
     vec3 lo, hi;
-    float cost;
-    uint count;  // primitives
-    uint inner;  // encoded nodes in it
-    uint height; // of the encoded nodes
+    float cost;     // SAH cost, not divided by the root's area
+    uint count;     // primitives
+    uint encoded;   // height in encoded nodes: a collapsed subtree has 0
+    uint height;    // height in inner nodes
+    bool collapsed; // one leaf is cheaper than its nodes
 };
 
-Subtree subtree_of(uint child) {
+Subtree load_subtree(uint child) {
     Subtree t;
+    t.collapsed = false;
     if ((child & RTR_CHILD_LEAF) != 0u) {
         uint prim = child & ~RTR_CHILD_LEAF;
         t.lo = leaf_box[2u * prim].xyz;
         t.hi = leaf_box[2u * prim + 1u].xyz;
         t.cost = half_area(t.lo, t.hi) * RTR_COST_SLOT;
         t.count = 1u;
-        t.inner = 0u;
+        t.encoded = 0u;
         t.height = 0u;
     } else {
         vec4 a = node_box[2u * child];
@@ -26,24 +27,35 @@ Subtree subtree_of(uint child) {
         t.hi = b.xyz;
         t.cost = a.w;
         t.count = info[child].w & ~RTR_COLLAPSED;
-        t.inner = misc & RTR_INNER_MASK;
-        t.height = misc >> RTR_HEIGHT_SHIFT;
+        t.encoded = (misc >> RTR_ENCODED_SHIFT) & RTR_HEIGHT_MASK;
+        t.height = misc & RTR_HEIGHT_MASK;
     }
     return t;
 }
 
-// Stores box, cost and counts of `node`; returns the word for info[node].w.
-uint store_node(uint node, Subtree a, Subtree b, bool is_root) {
-    vec3 lo = min(a.lo, b.lo), hi = max(a.hi, b.hi);
-    float area = half_area(lo, hi);
-    uint count = a.count + b.count;
+Subtree join(Subtree a, Subtree b, bool may_collapse) {
+    Subtree t;
+    t.lo = min(a.lo, b.lo);
+    t.hi = max(a.hi, b.hi);
+    t.count = a.count + b.count;
+    float area = half_area(t.lo, t.hi);
     float split_cost = min(area * RTR_COST_NODE + (a.cost + b.cost), RTR_FLT_MAX);
-    float leaf_cost = min(area * RTR_COST_SLOT * float(count), RTR_FLT_MAX);
-    bool collapse = !is_root && (p.flags & RTR_BUILD_TOP) == 0u && count <= RTC_MAX_LEAF_SLOTS &&
-                    leaf_cost <= split_cost;
-    uint inner = collapse ? 0u : 1u + a.inner + b.inner;
-    uint height = collapse ? 0u : 1u + max(a.height, b.height);
-    node_box[2u * node] = vec4(lo, collapse ? leaf_cost : split_cost);
-    node_box[2u * node + 1u] = vec4(hi, uintBitsToFloat(inner | (height << RTR_HEIGHT_SHIFT)));
-    return count | (collapse ? RTR_COLLAPSED : 0u);
+    float leaf_cost = min(area * RTR_COST_SLOT * float(t.count), RTR_FLT_MAX);
+    t.collapsed = may_collapse && t.count <= RTC_MAX_LEAF_SLOTS && leaf_cost <= split_cost;
+    t.cost = t.collapsed ? leaf_cost : split_cost;
+    t.encoded = t.collapsed ? 0u : 1u + max(a.encoded, b.encoded);
+    t.height = 1u + max(a.height, b.height);
+    return t;
+}
+
+void store_subtree(uint node, uint left, uint right, Subtree t) {
+    node_box[2u * node] = vec4(t.lo, t.cost);
+    node_box[2u * node + 1u] = vec4(t.hi, uintBitsToFloat(t.height | (t.encoded << RTR_ENCODED_SHIFT)));
+    info[node] = uvec4(left, right, 0u, t.count | (t.collapsed ? RTR_COLLAPSED : 0u));
+}
+
+void set_parent(uint child, uint parent) {
+    // Leaves are known by their sorted position, which slot_of still holds here.
+    if ((child & RTR_CHILD_LEAF) != 0u) links[p.total + slot_of[child & ~RTR_CHILD_LEAF]] = parent;
+    else links[child] = parent;
 }
