@@ -77,7 +77,7 @@ std::string_view code_before(const std::vector<std::string>& code, uint32_t line
 }
 
 std::string advice_for(const Diagnostic& message, std::string_view line_text,
-                       const std::vector<std::string>& code, bool has_extension) {
+                       const std::vector<std::string>& code) {
     const std::string_view text = message.text;
     const std::string token = quoted_token(text);
     if (contains(text, "extension not supported: GL_EXT_ray_tracing_position_fetch") ||
@@ -103,19 +103,21 @@ std::string advice_for(const Diagnostic& message, std::string_view line_text,
         const std::string_view before = code_before(code, message.line);
         if (!before.empty() && before.back() == '}' && contains(text, "expecting SEMICOLON"))
             return "a block before this ends in `}`; end it with `};` or an instance name";
-        if (!has_extension) {
-            for (std::string_view word : {"accelerationStructure", "rayPayload", "rayPayloadIn", "hitAttribute",
-                                          "callableData", "callableDataIn", "shaderRecord"})
-                for (std::string_view dialect : {"NV", "EXT"})
-                    if (has_word(line_text, std::string(word) + std::string(dialect)))
-                        return "write #extension GL_" + std::string(dialect) + "_ray_tracing : require";
-        }
     }
     if (contains(text, "required extension not requested"))
         return "write #extension GL_NV_ray_tracing : require or #extension GL_EXT_ray_tracing : require";
     if (token == "imageStore" && contains(text, "no matching overloaded function"))
         return "coordinates are ivec2/ivec3: convert gl_LaunchIDNV.xy with ivec2(…)";
     return {};
+}
+
+void add_spellings(const std::string& file, const std::vector<std::string>& code, uint32_t after,
+                   std::vector<Diagnostic>& diagnostics) {
+    for (uint32_t line = after + 1; line <= code.size(); ++line)
+        for (const Spelling& spelling : kSpellings)
+            if (has_word(code[line - 1], spelling.old_name))
+                diagnostics.push_back({Severity::Error, "glsl-old-spelling", file, line,
+                                       "'" + std::string(spelling.old_name) + "' : " + std::string(spelling.advice)});
 }
 
 }  // namespace
@@ -125,16 +127,29 @@ void add_advice(const std::string& file, const std::string& source, std::vector<
     for (const Diagnostic& message : diagnostics) any |= message.severity == Severity::Error;
     if (!any) return;
 
-    const SourceFacts facts = scan_source(source);
     const std::vector<std::string> code = lines_of(strip_comments(source));
     for (Diagnostic& message : diagnostics) {
         if (message.severity != Severity::Error) continue;
         const bool here = message.file == file && message.line >= 1 && message.line <= code.size();
-        const std::string advice = advice_for(message, here ? std::string_view(code[message.line - 1]) : "", code,
-                                              facts.names_nv || facts.names_ext);
+        const std::string advice = advice_for(message, here ? std::string_view(code[message.line - 1]) : "", code);
         if (contains(message.text, "GL_EXT_ray_tracing_position_fetch")) message.id = "position-fetch-glsl";
         if (!advice.empty()) message.text += "; " + advice;
     }
+
+    // A syntax error ends the parse: what is misspelled behind it is told all the same.
+    for (size_t i = 0, count = diagnostics.size(); i < count; ++i)
+        if (diagnostics[i].file == file && contains(diagnostics[i].text, "syntax error"))
+            return add_spellings(file, code, diagnostics[i].line, diagnostics);
+}
+
+std::string extension_used(const std::string& source) {
+    const std::string code = strip_comments(source);
+    for (std::string_view word : {"accelerationStructure", "rayPayload", "rayPayloadIn", "hitAttribute",
+                                  "callableData", "callableDataIn", "shaderRecord", "gl_LaunchID"})
+        for (std::string_view dialect : {"NV", "EXT"})
+            if (has_word(code, std::string(word) + std::string(dialect)))
+                return "GL_" + std::string(dialect) + "_ray_tracing";
+    return {};
 }
 
 }  // namespace rtc

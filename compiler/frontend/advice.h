@@ -13,4 +13,7 @@ namespace rtc {
 // the advice that needs no text.
 void add_advice(const std::string& file, const std::string& source, std::vector<Diagnostic>& diagnostics);
 
+// The ray tracing extension whose words the text uses; empty when it uses none.
+std::string extension_used(const std::string& source);
+
 }  // namespace rtc

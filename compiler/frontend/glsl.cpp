@@ -41,8 +41,10 @@ void report(FrontendResult& result, const char* id, const std::string& file, uin
     result.diagnostics.push_back({Severity::Error, id, file, line, std::move(text)});
 }
 
-std::string preamble_for(const FrontendOptions& options) {
+// `assumed` is an extension that the source should have asked for.
+std::string preamble_for(const FrontendOptions& options, const std::string& assumed) {
     std::string preamble = "#extension GL_GOOGLE_include_directive : enable\n";
+    if (!assumed.empty()) preamble += "#extension " + assumed + " : enable\n";
     for (const Macro& macro : options.macros)
         preamble += macro.value ? "#define " + macro.name + " " + *macro.value + "\n"
                                 : "#undef " + macro.name + "\n";
@@ -109,8 +111,8 @@ void set_environment(glslang::TShader& shader, EShLanguage stage, Environment en
 
 // Keeps the pointers that TShader::setStrings… stores alive as long as the shader.
 struct ShaderText {
-    ShaderText(const GlslSource& source, const FrontendOptions& options)
-        : preamble(preamble_for(options)), text(source.text.c_str()),
+    ShaderText(const GlslSource& source, const FrontendOptions& options, const std::string& assumed = {})
+        : preamble(preamble_for(options, assumed)), text(source.text.c_str()),
           length(static_cast<int>(source.text.size())), name(source.file.c_str()) {}
     void give_to(glslang::TShader& shader) {
         shader.setStringsWithLengthsAndNames(&text, &length, &name, 1);
@@ -153,7 +155,7 @@ bool preprocess(const GlslSource& source, const SourceFacts& facts, const Fronte
 }
 
 Attempt compile(const GlslSource& source, const SourceFacts& facts, const FrontendOptions& options, StageKind kind,
-                Environment environment) {
+                Environment environment, const std::string& assumed = {}) {
     initialize_glslang();
     Attempt attempt;
     FrontendResult& result = attempt.result;
@@ -161,8 +163,11 @@ Attempt compile(const GlslSource& source, const SourceFacts& facts, const Fronte
     Version version;
     const bool version_ok = chosen_version(source, facts, options, version, result);
 
+    if (!assumed.empty())
+        report(result, "extension-missing", source.file, 1, "no #extension; write #extension " + assumed + " : require");
+
     const EShLanguage stage = glslang_stage(kind);
-    ShaderText text(source, options);
+    ShaderText text(source, options, assumed);
     SourceIncluder includer(options);
     glslang::TShader shader(stage);
     text.give_to(shader);
@@ -182,7 +187,7 @@ Attempt compile(const GlslSource& source, const SourceFacts& facts, const Fronte
         linked = program.link(messages);
         parse_glslang_log(program.getInfoLog(), source.file, result.diagnostics);
     }
-    if (!parsed || !linked || !version_ok) {
+    if (!parsed || !linked || !version_ok || !assumed.empty()) {
         for (const Diagnostic& message : result.diagnostics)
             attempt.wants_ext |= message.text.find("not supported for current targeted SPIR-V") != std::string::npos;
         add_advice(source.file, source.text, result.diagnostics);
@@ -324,6 +329,13 @@ FrontendResult compile_glsl(const GlslSource& source, const FrontendOptions& opt
         // An NV shader with a feature of later SPIR-V: the newer environment parses NV too.
         Attempt second = compile(source, facts, options, kind, Environment::Ext);
         if (second.result.ok) attempt = std::move(second);
+    }
+    // Without the extension the first of its words ends the parse; with it, the messages say all at once.
+    if (!attempt.result.ok && !facts.names_nv && !facts.names_ext && !attempt.wants_ext) {
+        const std::string missing = extension_used(source.text);
+        if (!missing.empty())
+            attempt = compile(source, facts, options, kind,
+                              missing == "GL_NV_ray_tracing" ? Environment::Nv : Environment::Ext, missing);
     }
     return std::move(attempt.result);
 }

@@ -1,4 +1,4 @@
-// Reflection as JSON and back. The schema is documented in docs/reflection.md;
+// Reflection as JSON and back. The keys are listed in reflection_io.h;
 // keys keep the order written here, so that equal pipelines give equal bytes.
 #include <nlohmann/json.hpp>
 

@@ -1,5 +1,17 @@
 // Reflection beyond pipeline.h: reading it back whole, from a finished module or
-// from its JSON.
+// from its JSON. The JSON object, keys in this order; integers unless said:
+//
+//   abiVersion, identity ("0x…"), flags (["resumable", "addressMode"]),
+//   spirvVersion ("1.3"), instructions, states, maxRecursionDepth, maxCallableDepth,
+//   stackWords, scratchWords, payloadWords, attributeWords, callableWords, pushConstantBytes,
+//   reserved {set, binding, bindings [{name, binding}]}   names: params, heapTexels, heap,
+//            sbtRaygen, sbtMiss, sbtHit, sbtCallable, control, scratch
+//   requiredFeatures [string]
+//   stages [{name, kind ("rgen"…"rcall"), file, firstState, states, payloadWords, recordBytes}]
+//   groups [{name, kind ("general", "triangles", "procedural"), handle [8 × "0x…"]}]
+//   resources [{name, stage, set, binding, type, arraySize (0: runtime array)}]
+//   specConstants [{stage, name, originalId, id, type, default ("0x…", its bit pattern)}]
+//   traceSites [{stage, file, line, call ("trace", "callable"), frameBytes, variables [string]}]
 #pragma once
 
 #include <cstdint>

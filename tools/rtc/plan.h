@@ -46,7 +46,7 @@ struct Plan {
 // Throws UsageError or InputError.
 Plan make_plan(const Arguments& arguments, SourceFiles& files);
 
-// Adds what a --pipeline file says: {"stages": […], "groups": […]}, see docs/rtc.md.
+// Adds what a --pipeline file says: {"stages": […], "groups": […]}, see pipeline_file.cpp.
 void add_pipeline_file(const std::string& path, SourceFiles& files, Plan& plan);
 
 rtcc_stage stage_kind_of(const SourceFile& source, rtcc_stage wanted, const std::optional<std::string>& entry);

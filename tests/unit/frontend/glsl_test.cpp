@@ -146,19 +146,33 @@ TEST(Glsl, StageNames) {
 
 // The talk's shaders as printed are negative tests: errors that name the replacement.
 TEST(Glsl, ThePrintedSeedShadersSayWhatToWrite) {
-    const std::string raygen =
-        "#version 460\n#extension GL_NV_ray_tracing : require\n"
-        "layout(set = 0, binding = 0) accelerationStructureNV scene;\n"
-        "layout(set = 1, binding = 0) image2D framebufferImage;\n"
-        "layout(location = 1) rayPayloadNV primaryPayload {\n    vec4 color;\n};\n"
-        "void main() {\n"
-        "    primaryPayload.color = vec4(0.0, 0.0, 0.0, 0.0);\n"
-        "    imageStore(framebufferImage, gl_GlobalInvocationIDNV.xy, primaryPayload.color);\n}\n";
-    const std::string text = errors_of(rtc::compile_glsl({rtc::StageKind::RayGen, "seed.rgen", raygen}, {}));
-    EXPECT_THAT(text, HasSubstr("write `uniform` before the type"));
-    EXPECT_THAT(text, HasSubstr("declare it writeonly"));
-    EXPECT_THAT(text, HasSubstr("give the block an instance"));
-    EXPECT_THAT(text, HasSubstr("write gl_LaunchIDNV"));
+    const auto errors = [](const std::string& name) {
+        std::ifstream stream(std::string(RTC_SHADERS) + "/seed/printed/" + name, std::ios::binary);
+        const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+        EXPECT_FALSE(text.empty());
+        const rtc::FrontendResult result = rtc::compile_glsl({std::nullopt, name, text}, {});
+        EXPECT_FALSE(result.ok);
+        return errors_of(result);
+    };
+    const std::string raygen = errors("raygen.rgen");
+    for (const char* advice : {"#version 460", "#extension GL_NV_ray_tracing : require", "write `uniform`",
+                               "declare it writeonly", "end it with `};`", "write gl_LaunchIDNV"})
+        EXPECT_THAT(raygen, HasSubstr(advice));
+    const std::string hit = errors("closesthit.rchit");
+    for (const char* advice : {"#version 460", "#extension GL_NV_ray_tracing : require", "end it with `};`",
+                               "write gl_HitTNV"})
+        EXPECT_THAT(hit, HasSubstr(advice));
+}
+
+TEST(Glsl, BlockNamesUsedAsVariablesAreExplained) {
+    const rtc::FrontendResult result = rtc::compile_glsl(
+        {rtc::StageKind::RayGen, "a.rgen",
+         "#version 460\n#extension GL_NV_ray_tracing : require\n"
+         "layout(location = 1) rayPayloadNV primaryPayload {\n    vec4 color;\n};\n"
+         "void main() {\n    primaryPayload.color = vec4(0.0);\n}\n"}, {});
+    ASSERT_EQ(result.diagnostics.size(), 1u);
+    EXPECT_EQ(result.diagnostics[0].line, 7u);
+    EXPECT_THAT(result.diagnostics[0].text, HasSubstr("give the block an instance"));
 }
 
 }  // namespace
