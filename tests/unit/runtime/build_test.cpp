@@ -105,6 +105,28 @@ TEST_P(BuildTest, TerrainCollapsesIntoLeaves) {
     EXPECT_LE(bytes, 90.0);
 }
 
+// Larger than one storage buffer of lavapipe can be: nodes and slots are reached through
+// windows. Long: run by name, --gtest_also_run_disabled_tests.
+TEST_P(BuildTest, DISABLED_FourMillion) {
+    const uint32_t n = 1448;  // 2 n^2 = 4 193 408 triangles
+    Scene scene(*vk, rtr, 500u << 20);
+    std::vector<Vec3> vertices;
+    std::vector<uint32_t> indices;
+    for (uint32_t y = 0; y <= n; y++)
+        for (uint32_t x = 0; x <= n; x++)
+            vertices.push_back({float(x), std::sin(0.3f * x) * std::cos(0.2f * y), float(y)});
+    for (uint32_t y = 0; y < n; y++) {
+        for (uint32_t x = 0; x < n; x++) {
+            uint32_t a = y * (n + 1) + x;
+            for (uint32_t i : {a, a + 1, a + n + 1, a + 1, a + n + 2, a + n + 1}) indices.push_back(i);
+        }
+    }
+    auto as = scene.build_bottom({scene.triangles(vertices, &indices)}, flags());
+    TreeFacts facts;
+    check_structure(scene, as, facts);
+    EXPECT_EQ(facts.slots.size(), 2u * n * n);
+}
+
 TEST_P(BuildTest, AllTheSame) {
     Scene scene(*vk, rtr, 4 << 20);
     std::vector<Vec3> vertices;

@@ -1,6 +1,8 @@
 #include "scene_util.h"
 
+#include <chrono>
 #include <cmath>
+#include <cstdlib>
 
 Scene::Scene(Vulkan& v, RtrDevice d, VkDeviceSize heap_size) : vk(v), rtr(d) {
     heap_buffer = vk.buffer(heap_size, RTR_HEAP_BUFFER_USAGE);
@@ -37,7 +39,11 @@ void Scene::run(const std::function<void()>& record) {
     vk.begin();
     EXPECT_EQ(rtrBeginRecorder(recorder, vk.cmd), VK_SUCCESS);
     record();
+    auto begin = std::chrono::steady_clock::now();
     vk.submit();
+    if (getenv("RTC_TEST_TIMES"))
+        printf("submit %.1f ms\n",
+               std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() * 1e3);
     EXPECT_EQ(rtrRetireRecorder(recorder), VK_SUCCESS);
 }
 

@@ -51,6 +51,7 @@ std::unique_ptr<Vulkan> Vulkan::create(std::string& why) {
     std::vector<VkLayerProperties> layers(count);
     enumerate_layers(&count, layers.data());
     for (auto& l : layers) v->validation |= !strcmp(l.layerName, "VK_LAYER_KHRONOS_validation");
+    if (getenv("RTC_TEST_NO_VALIDATION")) v->validation = false;  // for timing by hand
 
     VkApplicationInfo app{VK_STRUCTURE_TYPE_APPLICATION_INFO};
     app.apiVersion = VK_API_VERSION_1_1;
