@@ -154,7 +154,10 @@ class Linker {
         stage.index = index;
         stage.name = stage_input.name;
         stage.file = stage_input.file;
-        lower::select_entry(program_, stage, std::move(functions), map.at(entry_function));
+        std::set<Id> variables;
+        for (const Inst& inst : module.globals)
+            if (inst.op == Op::OpVariable) variables.insert(map.at(inst.result));
+        lower::select_entry(program_, stage, std::move(functions), map.at(entry_function), variables);
         // NV's exits and locations first: nothing later may see code after an ignore.
         lower::normalize_calls(program_, stage);
         check::check_stage(program_, stage, input_, result_.diagnostics);

@@ -26,7 +26,8 @@ void visit_callees(const Function& function, const std::function<void(const Inst
 
 }  // namespace
 
-void select_entry(Program& program, Stage& stage, std::vector<Function> functions, Id entry) {
+void select_entry(Program& program, Stage& stage, std::vector<Function> functions, Id entry,
+                  const std::set<Id>& module_variables) {
     std::map<Id, size_t> by_id;
     for (size_t i = 0; i < functions.size(); ++i) by_id[functions[i].id()] = i;
     if (!by_id.count(entry)) stage.fail("entry-point-missing", {}, "the entry point names no function", program);
@@ -63,8 +64,15 @@ void select_entry(Program& program, Stage& stage, std::vector<Function> function
         else
             stage.functions.push_back(std::move(functions[i]));
     }
-    for (const Inst& inst : program.module.globals)
-        if (inst.op == Op::OpVariable && used.count(inst.result)) stage.variables.push_back(inst.result);
+    for (const Inst& inst : program.module.globals) {
+        if (inst.op != Op::OpVariable || !module_variables.count(inst.result)) continue;
+        const auto storage = static_cast<spv::StorageClass>(inst.ops[0]);
+        // NV's calls name their data by location only.
+        const bool call_data =
+            storage == spv::StorageClass::RayPayloadKHR || storage == spv::StorageClass::CallableDataKHR ||
+            storage == spv::StorageClass::IncomingRayPayloadKHR || storage == spv::StorageClass::IncomingCallableDataKHR;
+        if (call_data || used.count(inst.result)) stage.variables.push_back(inst.result);
+    }
 }
 
 }  // namespace rtc::lower

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -62,8 +63,9 @@ inline bool is_callable(Op op) { return op == Op::OpExecuteCallableKHR; }
 inline bool is_report(Op op) { return op == Op::OpReportIntersectionKHR; }
 
 // entry.cpp: checks the module's rules for its stage and picks the entry point's functions; sets
-// Stage::body, functions, variables. `functions` are the imported functions of the stage's module.
-void select_entry(Program& program, Stage& stage, std::vector<Function> functions, Id entry);
+// Stage::body, functions, variables. `functions` and `module_variables` are what the stage's module brought.
+void select_entry(Program& program, Stage& stage, std::vector<Function> functions, Id entry,
+                  const std::set<Id>& module_variables);
 
 // exits.cpp: NV's ignore/terminate become terminators; NV's trace and callable locations become variables.
 void normalize_calls(Program& program, Stage& stage);
