@@ -49,7 +49,7 @@ rtcc_status rtcc_options_add_macro(rtcc_options_t options, const char* name, con
         const std::string_view text = value ? value : "";
         if (!is_macro_name(name) || text.find('\n') != std::string_view::npos) return RTCC_STATUS_INVALID_ARGUMENT;
         // GLSL forbids redefinition with another value; the last -D wins.
-        
+        std::erase_if(o.frontend.macros, [&](const rtc::Macro& m) { return m.name == name; });
         o.frontend.macros.push_back({name, std::string(text)});
         return RTCC_STATUS_SUCCESS;
     });
@@ -58,7 +58,7 @@ rtcc_status rtcc_options_add_macro(rtcc_options_t options, const char* name, con
 rtcc_status rtcc_options_undefine_macro(rtcc_options_t options, const char* name) {
     return set(options, [&](rtcc_options& o) {
         if (!is_identifier(name)) return RTCC_STATUS_INVALID_ARGUMENT;
-        
+        std::erase_if(o.frontend.macros, [&](const rtc::Macro& m) { return m.name == name; });
         o.frontend.macros.push_back({name, std::nullopt});
         return RTCC_STATUS_SUCCESS;
     });

@@ -92,7 +92,7 @@ void rtcc_result::publish(rtcc_status wanted, const rtcc_options& options) {
         for (rtc::Diagnostic& message : diagnostics)
             if (message.severity == rtc::Severity::Warning) {
                 message.severity = rtc::Severity::Error;
-
+                if (status == RTCC_STATUS_SUCCESS) status = RTCC_STATUS_COMPILATION_ERROR;
             }
     if (status != RTCC_STATUS_SUCCESS) {
         words.clear();

@@ -246,7 +246,7 @@ bool find_stage(const GlslSource& source, const SourceFacts& facts, StageKind& k
 Environment find_environment(const GlslSource& source, const FrontendOptions& options, StageKind kind,
                              const SourceFacts& facts) {
     if (!facts.names_ext) return Environment::Nv;
-    return Environment::Ext;
+    if (!facts.names_nv) return Environment::Ext;
     FrontendResult preprocessed;
     bool ignored = false;
     if (!preprocess(source, facts, options, kind, Environment::Ext, preprocessed, ignored)) return Environment::Ext;

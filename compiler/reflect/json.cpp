@@ -230,7 +230,7 @@ std::string reflection_to_json(const Reflection& reflection) {
 
 std::string embedded_json(const Reflection& reflection) {
     Reflection placeless = reflection;
-
+    for (StageReport& stage : placeless.stages) stage.file = last_component(stage.file);
     for (TraceSiteReport& site : placeless.trace_sites) site.file = last_component(site.file);
     return to_json(placeless).dump(-1, ' ', false, Json::error_handler_t::replace);
 }
