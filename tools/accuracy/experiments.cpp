@@ -106,6 +106,11 @@ std::vector<Placed> points_of(const std::string& axis) {
         }
     } else if (axis == "distance") {
         for (int e = 1; e <= 8; ++e) add(power_text(e), make_icosphere(4), 1, e <= 5).c.distance = std::pow(10.0, e);
+        // The other way round: small origins, large vertices.
+        for (int e = 1; e <= 6; ++e) {
+            const double at = std::pow(10.0, e);
+            add("0 to " + power_text(e), moved(make_icosphere(4), 1, {at, -at, at / 2}), 1, true).c.from_zero = true;
+        }
     } else if (axis == "transform") {
         for (const auto& [name, transform] : transforms()) {
             for (const IndexedMesh& mesh : {make_icosphere(4), make_torus_knot(200, 16)}) {
@@ -235,6 +240,13 @@ void measure_culls(DeviceTracer& tracer, uint64_t rays, std::vector<CullRow>& ro
             c.centre = {float(at), float(-at), float(at / 2)};
             char text[32];
             std::snprintf(text, sizeof text, "offset %.0e", at);
+            measure(text, moved(mesh, 1, {at, -at, at / 2}), c);
+        }
+        for (double at : {1e1, 1e2, 1e3, 1e4, 1e5}) {
+            LeakCase c;
+            c.from_zero = true;
+            char text[32];
+            std::snprintf(text, sizeof text, "0 to %.0e", at);
             measure(text, moved(mesh, 1, {at, -at, at / 2}), c);
         }
         for (double distance : {1e2, 1e4, 1e6}) {

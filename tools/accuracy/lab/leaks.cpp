@@ -45,6 +45,7 @@ std::vector<Ray> leak_rays(const LeakCase& c, uint64_t count, uint64_t batch) {
         const double reach = c.from_inside ? 0.2 : c.distance;
         Vec3 origin = {float(c.centre.x + v[0] / length * reach * c.size), float(c.centre.y + v[1] / length * reach * c.size),
                        float(c.centre.z + v[2] / length * reach * c.size)};
+        if (c.from_zero) origin = {float(v[0] / length), float(v[1] / length), float(v[2] / length)};
         Vec3 world_origin, direction;
         if (c.axis_parallel >= 0) {
             // Along an axis of the object, identity transform: the ray meets the target exactly. The

@@ -19,6 +19,7 @@ struct LeakCase {
     Vec3 centre;                 // of the mesh, object space
     double size = 1;             // radius of a ball round the mesh
     double distance = 3;         // of outside origins, in sizes
+    bool from_zero = false;      // outside origins lie within one unit of (0, 0, 0) instead
     int axis_parallel = -1;      // >= 0: rays run along this axis exactly
     uint64_t seed = 1;
 };
