@@ -60,6 +60,23 @@ TEST_F(Diagnostics, DashWerrorMakesThemErrors) {
     EXPECT_FALSE(exists("a.rmiss.spv"));
 }
 
+// The linker's own warnings obey the same options and name the source line.
+TEST_F(Diagnostics, LinkWarnings) {
+    std::string source = raygen_shader();
+    source.replace(source.find("0xff"), 4, "0x00");
+    write("a.rgen", source);
+    write("b.rmiss", miss_shader());
+    CliRun run = rtc("a.rgen b.rmiss -o out.spv");
+    EXPECT_EQ(run.status, 0);
+    EXPECT_THAT(run.err, HasSubstr("a.rgen:7: warning: the cull mask is 0"));
+    EXPECT_TRUE(exists("out.spv"));
+    EXPECT_EQ(rtc("-w a.rgen b.rmiss").err, "");
+    run = rtc("-Werror a.rgen b.rmiss -o strict.spv");
+    EXPECT_EQ(run.status, 1);
+    EXPECT_THAT(run.err, HasSubstr("a.rgen:7: error: the cull mask is 0"));
+    EXPECT_FALSE(exists("strict.spv"));
+}
+
 TEST_F(Diagnostics, DashStdOverridesTheVersion) {
     write("old.rmiss", "#version 450\n" + miss_shader().substr(13));
     const CliRun run = rtc("-c old.rmiss");
