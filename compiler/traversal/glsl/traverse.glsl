@@ -133,30 +133,31 @@ uint rtc_test_triangle(uint slot) {
     uvec4 q2 = rtc_quad(at + 2u);
     float t, b1, b2;
     bool front;
-    bool hit = rtc_triangle(uintBitsToFloat(q0.xyz), uintBitsToFloat(q1.xyz), uintBitsToFloat(q2.xyz), t, b1, b2, front);
-    front = front != ((rtc_trav_bits & RTC_LEVEL_FLIP) != 0u);
-    uint opacity = rtc_opacity(q1.w);
-    uint cull = front ? RTC_LEVEL_CULL_FRONT : RTC_LEVEL_CULL_BACK;
-    hit = hit && t > rtc_trav_tmin && t < rtc_trav_tmax && (rtc_trav_bits & cull) == 0u && opacity != 2u;
     uint result = RTC_STEP_RUNNING;
-    if (hit) {
-        rtc_candidate(q0.w, q1.w, opacity);
-        rtc_cand_t = t * rtc_trav_t_down;
-        rtc_cand_kind = front ? RTC_HIT_KIND_FRONT : RTC_HIT_KIND_BACK;
-        rtc_cand_attr0 = floatBitsToUint(b1);
-        rtc_cand_attr1 = floatBitsToUint(b2);
-        if (RTC_LINK_AABBS) {
-            rtc_cand_attr2 = 0u;
-            rtc_cand_attr3 = 0u;
-            rtc_cand_attr4 = 0u;
-            rtc_cand_attr5 = 0u;
-            rtc_cand_attr6 = 0u;
-            rtc_cand_attr7 = 0u;
-        }
-        if (RTC_LINK_ANY_HIT && opacity == 0u) {
-            result = RTC_STEP_TRIANGLE;
-        } else {
-            rtc_trace_accept();
+    if (rtc_triangle(uintBitsToFloat(q0.xyz), uintBitsToFloat(q1.xyz), uintBitsToFloat(q2.xyz), t, b1, b2, front) &&
+        t > rtc_trav_tmin && t < rtc_trav_tmax) {
+        front = front != ((rtc_trav_bits & RTC_LEVEL_FLIP) != 0u);
+        uint opacity = rtc_opacity(q1.w);
+        uint cull = front ? RTC_LEVEL_CULL_FRONT : RTC_LEVEL_CULL_BACK;
+        if ((rtc_trav_bits & cull) == 0u && opacity != 2u) {
+            rtc_candidate(q0.w, q1.w, opacity);
+            rtc_cand_t = t * rtc_trav_t_down;
+            rtc_cand_kind = front ? RTC_HIT_KIND_FRONT : RTC_HIT_KIND_BACK;
+            rtc_cand_attr0 = floatBitsToUint(b1);
+            rtc_cand_attr1 = floatBitsToUint(b2);
+            if (RTC_LINK_AABBS) {
+                rtc_cand_attr2 = 0u;
+                rtc_cand_attr3 = 0u;
+                rtc_cand_attr4 = 0u;
+                rtc_cand_attr5 = 0u;
+                rtc_cand_attr6 = 0u;
+                rtc_cand_attr7 = 0u;
+            }
+            if (RTC_LINK_ANY_HIT && opacity == 0u) {
+                result = RTC_STEP_TRIANGLE;
+            } else {
+                rtc_trace_accept();
+            }
         }
     }
     return result;

@@ -172,10 +172,15 @@ bool rtc_triangle(vec3 v0, vec3 v1, vec3 v2, out float t, out float b1, out floa
         det = (e0 + e1) + e2;
         hit = hit && det != 0.0;
     }
-    float inverse = 1.0 / det;
-    b1 = e1 * inverse;
-    b2 = e2 * inverse;
-    t = ((a.z + b1 * (b.z - a.z)) + b2 * (c.z - a.z)) / rtc_trav_shear.z;
+    t = 0.0;
+    b1 = 0.0;
+    b2 = 0.0;
+    if (hit) { // few tests hit: two divisions less for the others
+        float inverse = 1.0 / det;
+        b1 = e1 * inverse;
+        b2 = e2 * inverse;
+        t = ((a.z + b1 * (b.z - a.z)) + b2 * (c.z - a.z)) / rtc_trav_shear.z;
+    }
     // det is minus (normal . d) / d.kz, front faces have normal . d < 0.
     front = (det > 0.0) == (rtc_trav_shear.z > 0.0);
     return hit;
