@@ -22,16 +22,26 @@ void store_leaf(bool in_range, uint i, bool active_, vec3 lo, vec3 hi) {
     if (lane == 0u) red_active = 0u;
     barrier();
     if (active_) atomicAdd(red_active, 1u);
-    for (uint s = 128u; s > 0u; s >>= 1u) {
-        barrier();
-        if (lane < s) {
-            for (uint k = 0u; k < 3u; k++) {
-                red_lo[k * 256u + lane] = min(red_lo[k * 256u + lane], red_lo[k * 256u + lane + s]);
-                red_hi[k * 256u + lane] = max(red_hi[k * 256u + lane], red_hi[k * 256u + lane + s]);
+    // Two steps of 16: few barriers, since a barrier is dear where a workgroup is a loop
+    // over vectors (llvmpipe).
+    if (lane < 16u) {
+        for (uint k = 0u; k < 3u; k++) {
+            float l = red_lo[k * 256u + lane], h = red_hi[k * 256u + lane];
+            for (uint s = lane + 16u; s < 256u; s += 16u) {
+                l = min(l, red_lo[k * 256u + s]);
+                h = max(h, red_hi[k * 256u + s]);
             }
+            red_lo[k * 256u + lane] = l;
+            red_hi[k * 256u + lane] = h;
         }
     }
     barrier();
+    if (lane < 3u) {
+        for (uint s = 1u; s < 16u; s++) {
+            red_lo[lane * 256u] = min(red_lo[lane * 256u], red_lo[lane * 256u + s]);
+            red_hi[lane * 256u] = max(red_hi[lane * 256u], red_hi[lane * 256u + s]);
+        }
+    }
     if (lane < 3u && red_active != 0u) {
         atomicMin(state[RTR_ST_CENTER_MIN + lane], order_encode(red_lo[lane * 256u]));
         atomicMax(state[RTR_ST_CENTER_MAX + lane], order_encode(red_hi[lane * 256u]));
