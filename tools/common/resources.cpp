@@ -205,6 +205,33 @@ Image& Image::operator=(Image&& other) noexcept {
     return *this;
 }
 
+BufferView::BufferView(const Context& context, const Buffer& buffer, VkFormat format)
+    : device_(context.device) {
+    const VkDeviceSize texels = buffer.size / std::max(1u, format_texel_bytes(format));
+    if (texels > context.properties.limits.maxTexelBufferElements)
+        throw Error("a table of " + std::to_string(texels) +
+                    " texels exceeds the device's maxTexelBufferElements " +
+                    std::to_string(context.properties.limits.maxTexelBufferElements));
+    VkBufferViewCreateInfo info{};
+    info.sType = VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO;
+    info.buffer = buffer.handle;
+    info.format = format;
+    info.range = VK_WHOLE_SIZE;
+    check(vkCreateBufferView(device_, &info, nullptr, &handle), "vkCreateBufferView");
+}
+
+BufferView::~BufferView() {
+    if (device_) vkDestroyBufferView(device_, handle, nullptr);
+}
+
+BufferView::BufferView(BufferView&& other) noexcept { *this = std::move(other); }
+
+BufferView& BufferView::operator=(BufferView&& other) noexcept {
+    std::swap(handle, other.handle);
+    std::swap(device_, other.device_);
+    return *this;
+}
+
 uint32_t format_texel_bytes(VkFormat format) {
     switch (format) {
         case VK_FORMAT_R8_UNORM:

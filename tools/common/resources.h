@@ -72,6 +72,22 @@ class Image {
     VkDevice device_ = VK_NULL_HANDLE;
 };
 
+// A buffer seen as texels; the buffer must outlive it.
+class BufferView {
+  public:
+    BufferView() = default;
+    // Throws Error when the buffer has more texels than the device's maxTexelBufferElements.
+    BufferView(const Context& context, const Buffer& buffer, VkFormat format);
+    ~BufferView();
+    BufferView(BufferView&& other) noexcept;
+    BufferView& operator=(BufferView&& other) noexcept;
+
+    VkBufferView handle = VK_NULL_HANDLE;
+
+  private:
+    VkDevice device_ = VK_NULL_HANDLE;
+};
+
 uint32_t format_texel_bytes(VkFormat format);  // 0 for formats the tools do not know
 // Texels of all layers, tightly packed; the image stays in VK_IMAGE_LAYOUT_GENERAL (waits).
 std::vector<uint8_t> download_image(const Context& context, const Image& image);

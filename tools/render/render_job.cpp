@@ -17,7 +17,7 @@ namespace {
 constexpr uint32_t kMaxTextureSize = 1024;
 
 struct LaunchBlock {
-    uint32_t sample_index, write_color;
+    uint32_t sample_index;
 };
 
 constexpr std::pair<const char*, Integrator> kIntegrators[] = {{"path", Integrator::Path},
@@ -33,11 +33,12 @@ uint8_t encode_srgb(float linear) {
     return uint8_t(std::lround(encoded * 255.0f));
 }
 
-JobBinding buffer_binding(uint32_t binding, const Buffer& buffer) {
+JobBinding table_binding(uint32_t binding, const BufferView& view) {
     JobBinding result;
     result.set = 0;
     result.binding = binding;
-    result.buffers = {{buffer.handle, 0, VK_WHOLE_SIZE}};
+    result.type = VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER;
+    result.texel_buffers = {view.handle};
     return result;
 }
 
@@ -105,6 +106,7 @@ RenderJob::RenderJob(const Context& context, const Scene& scene, const RenderSet
     switch (settings.integrator) {
         case Integrator::Path:
             add_pass(folder, "primary.rgen", "hit.rchit", "miss.rmiss", 1, false);
+            passes.back().pipeline.shaders[0].constants = {{0, 0}};  // no colour, only the G-buffer
             add_pass(folder, "path.rgen", "hit.rchit", "miss.rmiss", 1, true);
             break;
         case Integrator::Reflections:
@@ -133,12 +135,17 @@ void RenderJob::upload_tables(const Context& context, const Scene& scene) {
     scene.bounds(low, high);
     frame.eye.w = settings.ao_radius > 0 ? settings.ao_radius : 0.25f * glm::length(high - low);
 
-    const VkBufferUsageFlags storage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
-    instances_ = upload_vector(context, tables.instances, storage);
-    vertices_ = upload_vector(context, tables.vertices, storage);
-    triangles_ = upload_vector(context, tables.triangles, storage);
-    materials_ = upload_vector(context, tables.materials, storage);
-    lights_ = upload_vector(context, tables.lights, storage);
+    auto upload = [&](const auto& rows, VkFormat format) {
+        Table table;
+        table.buffer = upload_vector(context, rows, VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT);
+        table.view = BufferView(context, table.buffer, format);
+        return table;
+    };
+    instances_ = upload(tables.instances, VK_FORMAT_R32G32B32A32_SFLOAT);
+    vertices_ = upload(tables.vertices, VK_FORMAT_R32G32B32A32_SFLOAT);
+    triangles_ = upload(tables.triangles, VK_FORMAT_R32G32B32A32_UINT);
+    materials_ = upload(tables.materials, VK_FORMAT_R32G32B32A32_SFLOAT);
+    lights_ = upload(tables.lights, VK_FORMAT_R32G32B32A32_SFLOAT);
     frame_ = upload_buffer(context, &frame, sizeof frame, VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT);
 }
 
@@ -218,15 +225,17 @@ void RenderJob::add_pass(const std::string& folder, const char* raygen, const ch
     texture.binding = 6;
     texture.type = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER;
     texture.images = {{sampler_.handle, textures_.view, VK_IMAGE_LAYOUT_GENERAL}};
-    JobBinding frame = buffer_binding(0, frame_);
+    JobBinding frame;
     frame.set = 1;
+    frame.binding = 0;
+    frame.buffers = {{frame_.handle, 0, VK_WHOLE_SIZE}};
     frame.type = VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER;
     job.bindings = {structure,
-                    buffer_binding(1, instances_),
-                    buffer_binding(2, vertices_),
-                    buffer_binding(3, triangles_),
-                    buffer_binding(4, materials_),
-                    buffer_binding(5, lights_),
+                    table_binding(1, instances_.view),
+                    table_binding(2, vertices_.view),
+                    table_binding(3, triangles_.view),
+                    table_binding(4, materials_.view),
+                    table_binding(5, lights_.view),
                     texture,
                     frame,
                     image_binding(1, accumulation),
@@ -238,7 +247,7 @@ void RenderJob::add_pass(const std::string& folder, const char* raygen, const ch
 }
 
 std::vector<uint8_t> RenderJob::push_constants(uint32_t sample) const {
-    const LaunchBlock block{sample, settings.integrator == Integrator::Primary ? 1u : 0u};
+    const LaunchBlock block{sample};
     std::vector<uint8_t> bytes(sizeof block);
     std::memcpy(bytes.data(), &block, sizeof block);
     return bytes;

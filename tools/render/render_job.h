@@ -55,7 +55,12 @@ class RenderJob {
     void add_pass(const std::string& folder, const char* raygen, const char* closest_hit, const char* miss,
                   uint32_t recursion, bool shadows);
 
-    Buffer instances_, vertices_, triangles_, materials_, lights_, frame_;
+    struct Table {
+        Buffer buffer;
+        BufferView view;
+    };
+    Table instances_, vertices_, triangles_, materials_, lights_;
+    Buffer frame_;
     Image textures_;
     struct SamplerOwner {
         VkDevice device = VK_NULL_HANDLE;

@@ -63,6 +63,7 @@ void add_lights(const Scene& scene, SceneTables& tables) {
         tables.lights.emplace_back(light.position, 0.0f);
         tables.lights.emplace_back(light.intensity, 0.0f);
     }
+    if (scene.lights.empty()) tables.lights.resize(tables.lights.size() + 2, glm::vec4(0.0f));
     FrameBlock& frame = tables.frame;
     frame.emitter_count = uint32_t(emitters.size());
     frame.point_light_count = uint32_t(scene.lights.size());
@@ -102,6 +103,8 @@ SceneTables make_tables(const Scene& scene, float aspect) {
                                           first_vertex + mesh.indices[3 * t + 1],
                                           first_vertex + mesh.indices[3 * t + 2], mesh.triangle_material(t));
     }
+    if (tables.triangles.size() >= 1u << 24)
+        throw Error("the scene has 2^24 triangles or more; the shaders' tables count them in floats");
     for (const Material& material : scene.materials)
         tables.materials.push_back(
             {glm::vec4(material.base_color, material.metallic),

@@ -12,14 +12,14 @@ namespace rtc::tools {
 
 struct InstanceEntry {
     glm::vec4 to_world[3], to_normal[3];
-    glm::uvec4 mesh;
+    glm::vec4 mesh;  // numbers as floats: below 2^24
 };
 struct VertexEntry {
     glm::vec4 position_u, normal_v;
 };
 struct MaterialEntry {
     glm::vec4 color_metallic, emission_roughness;
-    glm::uvec4 texture_flags;
+    glm::vec4 texture_flags;
 };
 struct FrameBlock {
     glm::vec4 eye, right, up, forward, sky_low, sky_high;

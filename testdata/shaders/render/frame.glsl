@@ -21,7 +21,6 @@ layout(set = 1, binding = 0, std140) uniform Frame {
 
 layout(push_constant) uniform Launch {
     uint sample_index;
-    uint write_color;  // the primary pass: 0 when it only fills the G-buffer
 } launch;
 
 // Sum over samples of the colour; w counts the rays traced.

@@ -2,25 +2,16 @@
 #ifndef SURFACE_GLSL
 #define SURFACE_GLSL
 
-struct InstanceEntry {
-    vec4 to_world[3];   // rows
-    vec4 to_normal[3];  // rows of the inverse transpose
-    uvec4 mesh;         // x: first triangle in the table, y: 1 when the mesh has normals
-};
-struct VertexEntry {
-    vec4 position_u;
-    vec4 normal_v;
-};
-struct MaterialEntry {
-    vec4 color_metallic;
-    vec4 emission_roughness;
-    uvec4 texture_flags;  // x: layer or ~0, y: 1 when both sides emit
-};
-
-layout(set = 0, binding = 1, std430) readonly buffer Instances { InstanceEntry instances[]; };
-layout(set = 0, binding = 2, std430) readonly buffer Vertices { VertexEntry vertices[]; };
-layout(set = 0, binding = 3, std430) readonly buffer Triangles { uvec4 triangles[]; };  // vertices, material
-layout(set = 0, binding = 4, std430) readonly buffer Materials { MaterialEntry materials[]; };
+// Texel buffers rather than storage buffers: reads with an index per invocation are several times cheaper
+// in CPU drivers. Instances have 7 texels by custom index: 3 rows of the transform, 3 rows of its inverse
+// transpose, then the first triangle in the table and 1 when the mesh has normals.
+layout(set = 0, binding = 1) uniform samplerBuffer instances;
+// 2 texels: position and u, normal and v.
+layout(set = 0, binding = 2) uniform samplerBuffer vertices;
+// The three vertices and the material.
+layout(set = 0, binding = 3) uniform usamplerBuffer triangles;
+// 3 texels: base colour and metallic; emission and roughness; texture layer or -1, 1 when both sides emit.
+layout(set = 0, binding = 4) uniform samplerBuffer materials;
 layout(set = 0, binding = 6) uniform sampler2DArray textures;
 
 struct Surface {
@@ -44,53 +35,58 @@ float spawn_offset(vec3 p0, vec3 p1, vec3 p2, vec3 position, vec3 translation) {
     return (32.0 / 16777216.0) * (magnitude.x + magnitude.y + magnitude.z);
 }
 
-vec3 to_world(InstanceEntry entry, vec3 p) {
+vec3 to_world(vec4 row0, vec4 row1, vec4 row2, vec3 p) {
     // Written out, so that `precise` holds for every operation (it does not reach into dot).
     precise vec3 world;
-    world.x = entry.to_world[0].x * p.x + entry.to_world[0].y * p.y + entry.to_world[0].z * p.z + entry.to_world[0].w;
-    world.y = entry.to_world[1].x * p.x + entry.to_world[1].y * p.y + entry.to_world[1].z * p.z + entry.to_world[1].w;
-    world.z = entry.to_world[2].x * p.x + entry.to_world[2].y * p.y + entry.to_world[2].z * p.z + entry.to_world[2].w;
+    world.x = row0.x * p.x + row0.y * p.y + row0.z * p.z + row0.w;
+    world.y = row1.x * p.x + row1.y * p.y + row1.z * p.z + row1.w;
+    world.z = row2.x * p.x + row2.y * p.y + row2.z * p.z + row2.w;
     return world;
 }
 
 // `hit` as the closest-hit shader wrote it; `direction` of the ray that found it.
 Surface fetch_surface(uvec4 hit, vec3 direction) {
-    InstanceEntry entry = instances[hit.x];
-    uvec4 triangle = triangles[entry.mesh.x + hit.y];
-    VertexEntry a = vertices[triangle.x], b = vertices[triangle.y], c = vertices[triangle.z];
-    MaterialEntry material = materials[triangle.w];
+    int entry = int(hit.x) * 7;
+    vec4 row0 = texelFetch(instances, entry), row1 = texelFetch(instances, entry + 1);
+    vec4 row2 = texelFetch(instances, entry + 2), mesh = texelFetch(instances, entry + 6);
+    uvec4 triangle = texelFetch(triangles, int(uint(mesh.x) + hit.y));
+    ivec3 corner = ivec3(triangle.xyz) * 2;
+    vec4 pu0 = texelFetch(vertices, corner.x), nv0 = texelFetch(vertices, corner.x + 1);
+    vec4 pu1 = texelFetch(vertices, corner.y), nv1 = texelFetch(vertices, corner.y + 1);
+    vec4 pu2 = texelFetch(vertices, corner.z), nv2 = texelFetch(vertices, corner.z + 1);
+    int shade = int(triangle.w) * 3;
+    vec4 color_metallic = texelFetch(materials, shade), emission_roughness = texelFetch(materials, shade + 1);
+    vec4 texture_flags = texelFetch(materials, shade + 2);
     float u = uintBitsToFloat(hit.z), v = uintBitsToFloat(hit.w), w = 1.0 - u - v;
 
-    vec3 p0 = to_world(entry, a.position_u.xyz);
-    vec3 p1 = to_world(entry, b.position_u.xyz);
-    vec3 p2 = to_world(entry, c.position_u.xyz);
+    vec3 p0 = to_world(row0, row1, row2, pu0.xyz);
+    vec3 p1 = to_world(row0, row1, row2, pu1.xyz);
+    vec3 p2 = to_world(row0, row1, row2, pu2.xyz);
     precise vec3 position = p0 * w + p1 * u + p2 * v;
 
     Surface surface;
     surface.position = position;
-    surface.spawn_offset = spawn_offset(p0, p1, p2, position,
-        vec3(entry.to_world[0].w, entry.to_world[1].w, entry.to_world[2].w));
+    surface.spawn_offset = spawn_offset(p0, p1, p2, position, vec3(row0.w, row1.w, row2.w));
     surface.ng = normalize(cross(p1 - p0, p2 - p0));
     bool front = dot(surface.ng, direction) < 0.0;
     surface.ng = front ? surface.ng : -surface.ng;
     surface.ns = surface.ng;
-    if (entry.mesh.y != 0u) {
-        vec3 n = a.normal_v.xyz * w + b.normal_v.xyz * u + c.normal_v.xyz * v;
-        n = normalize(vec3(dot(entry.to_normal[0].xyz, n), dot(entry.to_normal[1].xyz, n),
-                           dot(entry.to_normal[2].xyz, n)));
+    if (mesh.y != 0.0) {
+        vec3 n = nv0.xyz * w + nv1.xyz * u + nv2.xyz * v;
+        n = normalize(vec3(dot(texelFetch(instances, entry + 3).xyz, n), dot(texelFetch(instances, entry + 4).xyz, n),
+                           dot(texelFetch(instances, entry + 5).xyz, n)));
         n = dot(n, surface.ng) < 0.0 ? -n : n;
         // A shading normal that faces away from the viewer would shade the wrong side.
         surface.ns = dot(n, direction) < 0.0 ? n : surface.ng;
     }
-    surface.base_color = material.color_metallic.rgb;
-    surface.metallic = material.color_metallic.a;
-    surface.roughness = material.emission_roughness.a;
-    bool emits = front || material.texture_flags.y != 0u;
-    surface.emission = emits ? material.emission_roughness.rgb : vec3(0.0);
-    if (material.texture_flags.x != 0xffffffffu) {
-        vec2 uv = vec2(a.position_u.w, a.normal_v.w) * w + vec2(b.position_u.w, b.normal_v.w) * u +
-                  vec2(c.position_u.w, c.normal_v.w) * v;
-        surface.base_color *= textureLod(textures, vec3(uv, float(material.texture_flags.x)), 0.0).rgb;
+    surface.base_color = color_metallic.rgb;
+    surface.metallic = color_metallic.a;
+    surface.roughness = emission_roughness.a;
+    bool emits = front || texture_flags.y != 0.0;
+    surface.emission = emits ? emission_roughness.rgb : vec3(0.0);
+    if (texture_flags.x >= 0.0) {
+        vec2 uv = vec2(pu0.w, nv0.w) * w + vec2(pu1.w, nv1.w) * u + vec2(pu2.w, nv2.w) * v;
+        surface.base_color *= textureLod(textures, vec3(uv, texture_flags.x), 0.0).rgb;
     }
     return surface;
 }
