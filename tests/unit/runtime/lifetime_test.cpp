@@ -1,0 +1,234 @@
+// Host allocations go where the application sends them; recorders of several threads do
+// not disturb each other; misuse of objects is named.
+#include <cstdlib>
+#include <map>
+#include <mutex>
+#include <thread>
+
+#include "module_util.h"
+#include "scene_util.h"
+#include "spv/module_resume.h"
+
+namespace {
+
+// Counts what is allocated and fails on a foreign or double free.
+class Counter {
+  public:
+    Counter() {
+        callbacks.pUserData = this;
+        callbacks.pfnAllocation = [](void* user, size_t size, size_t alignment, VkSystemAllocationScope) -> void* {
+            auto* self = static_cast<Counter*>(user);
+            std::lock_guard lock(self->mutex_);
+            void* p = std::aligned_alloc(std::max<size_t>(alignment, 16), (size + 63) / 64 * 64);
+            self->live_[p] = size;
+            self->total++;
+            return p;
+        };
+        callbacks.pfnFree = [](void* user, void* p) {
+            if (!p) return;
+            auto* self = static_cast<Counter*>(user);
+            std::lock_guard lock(self->mutex_);
+            EXPECT_EQ(self->live_.erase(p), 1u) << "freed but not allocated here";
+            std::free(p);
+        };
+        callbacks.pfnReallocation = [](void* user, void* old, size_t size, size_t alignment,
+                                       VkSystemAllocationScope scope) -> void* {
+            auto* self = static_cast<Counter*>(user);
+            void* p = self->callbacks.pfnAllocation(user, size, alignment, scope);
+            size_t had = 0;
+            {
+                std::lock_guard lock(self->mutex_);
+                if (old) had = self->live_[old];
+            }
+            if (old) memcpy(p, old, std::min(had, size));
+            self->callbacks.pfnFree(user, old);
+            return p;
+        };
+    }
+    size_t live() const { return live_.size(); }
+    VkAllocationCallbacks callbacks{};
+    int total = 0;
+
+  private:
+    std::mutex mutex_;
+    std::map<void*, size_t> live_;
+};
+
+class LifetimeTest : public RuntimeTest {};
+
+TEST_F(LifetimeTest, AllocationsGoThroughTheCallbacks) {
+    Counter device_counter, object_counter;
+    RtrDeviceCreateInfo info{};
+    info.instance = vk->instance;
+    info.physicalDevice = vk->physical_device;
+    info.device = vk->device;
+    info.pfnGetInstanceProcAddr = vk->get_instance_proc_addr;
+    RtrDevice device = nullptr;
+    ASSERT_EQ(rtrCreateDevice(&info, &device_counter.callbacks, &device), VK_SUCCESS);
+    EXPECT_GT(device_counter.total, 0);
+    Buffer buffer = vk->buffer(1 << 20, RTR_HEAP_BUFFER_USAGE), control = vk->buffer(1 << 16, RTR_CONTROL_BUFFER_USAGE);
+    for (auto* a : {static_cast<const VkAllocationCallbacks*>(nullptr),
+                    static_cast<const VkAllocationCallbacks*>(&object_counter.callbacks)}) {
+        int before = device_counter.total;
+        RtrHeapCreateInfo heap_info{nullptr, buffer.handle, 0, buffer.size};
+        RtrHeap heap = nullptr;
+        ASSERT_EQ(rtrCreateHeap(device, &heap_info, a, &heap), VK_SUCCESS);
+        VkDeviceSize at = 0;
+        for (int i = 0; i < 100; i++) EXPECT_EQ(rtrAllocateHeapRange(heap, 256, 0, &at), VK_SUCCESS);
+        RtrRecorderCreateInfo recorder_info{nullptr, control.handle, 0, control.size};
+        RtrRecorder recorder = nullptr;
+        ASSERT_EQ(rtrCreateRecorder(device, &recorder_info, a, &recorder), VK_SUCCESS);
+        VkAccelerationStructureCreateInfoNV create{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_CREATE_INFO_NV};
+        create.info.sType = VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV;
+        create.info.type = VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV;
+        RtrAccelerationStructure as = nullptr;
+        ASSERT_EQ(rtrCreateAccelerationStructure(device, &create, a, &as), VK_SUCCESS);
+        RtrBindAccelerationStructureMemoryInfo bind{nullptr, as, heap, at};
+        ASSERT_EQ(rtrBindAccelerationStructureMemory(device, 1, &bind), VK_SUCCESS);
+        // Many builds: the recorder's pools grow.
+        Buffer scratch = vk->buffer(1 << 16, RTR_SCRATCH_BUFFER_USAGE);
+        vk->begin();
+        rtrBeginRecorder(recorder, vk->cmd);
+        for (int i = 0; i < 100; i++) {
+            EXPECT_EQ(rtrCmdBuildAccelerationStructure(recorder, &create.info, VK_NULL_HANDLE, 0, VK_FALSE, as, nullptr,
+                                                       scratch.handle, 0),
+                      VK_SUCCESS);
+            vk->compute_barrier();
+        }
+        vk->submit();
+        rtrDestroyRecorder(device, recorder, a);
+        rtrDestroyAccelerationStructure(device, as, a);
+        rtrDestroyHeap(device, heap, a);
+        vk->destroy(scratch);
+        EXPECT_EQ(object_counter.live(), 0u);
+        if (a) EXPECT_GT(object_counter.total, 0);
+        else EXPECT_GT(device_counter.total, before);
+    }
+    rtrDestroyDevice(device, &device_counter.callbacks);
+    EXPECT_EQ(device_counter.live(), 0u);
+    vk->destroy(buffer);
+    vk->destroy(control);
+}
+
+TEST_F(LifetimeTest, FailedCreationLeavesNothing) {
+    Counter counter;
+    RtcModuleHeader h = module_header(1u << RTC_BINDING_PARAMS, 1);
+    auto good = with_reflection(module_resume_spv, sizeof module_resume_spv, h, "{}");
+    RtrRayTracingPipelineCreateInfo info{};
+    info.pCode = good.data();
+    info.codeSize = good.size() * 4;
+    uint32_t value = 0;
+    VkSpecializationMapEntry entry{RTC_SPEC_FETCH, 0, 4};
+    VkSpecializationInfo specialization{1, &entry, 4, &value};
+    info.pSpecializationInfo = &specialization;
+    RtrPipeline pipeline = nullptr;
+    RtrTraceOptions options = RTR_TRACE_OPTIONS_DEFAULT;
+    options.workgroupSize = 33;
+    info.pOptions = &options;
+    EXPECT_EQ(rtrCreateRayTracingPipeline(rtr, VK_NULL_HANDLE, &info, &counter.callbacks, &pipeline),
+              VK_ERROR_VALIDATION_FAILED_EXT);
+    expect_runtime_error("trace-options");
+    info.codeSize = 20;
+    EXPECT_EQ(rtrCreateRayTracingPipeline(rtr, VK_NULL_HANDLE, &info, &counter.callbacks, &pipeline),
+              VK_ERROR_VALIDATION_FAILED_EXT);
+    expect_runtime_error("module");
+    EXPECT_EQ(pipeline, nullptr);
+    EXPECT_EQ(counter.live(), 0u);
+}
+
+TEST_F(LifetimeTest, ThreadsRecordAtTheSameTime) {
+    Scene scene(*vk, rtr, 4 << 20);
+    std::vector<Vec3> vertices;
+    for (int i = 0; i < 900; i++) vertices.push_back({float(i % 31), float(i % 17), float(i)});
+    std::vector<VkGeometryNV> geometry{scene.triangles(vertices)};
+    VkAccelerationStructureInfoNV info{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV};
+    info.type = VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_NV;
+    info.geometryCount = 1;
+    info.pGeometries = geometry.data();
+    struct Worker {
+        VkCommandPool pool;
+        VkCommandBuffer cmd;
+        RtrRecorder recorder;
+        RtrAccelerationStructure as;
+        Buffer scratch;
+    };
+    std::vector<Worker> workers(4);
+    for (auto& w : workers) {
+        VkCommandPoolCreateInfo pool{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
+        pool.queueFamilyIndex = vk->queue_family;
+        vk->CreateCommandPool(vk->device, &pool, nullptr, &w.pool);
+        VkCommandBufferAllocateInfo allocate{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO};
+        allocate.commandPool = w.pool;
+        allocate.commandBufferCount = 1;
+        vk->AllocateCommandBuffers(vk->device, &allocate, &w.cmd);
+        RtrRecorderCreateInfo recorder_info{};
+        ASSERT_EQ(rtrCreateRecorder(rtr, &recorder_info, nullptr, &w.recorder), VK_SUCCESS);
+        w.as = scene.create(info);
+        w.scratch = vk->buffer(scene.scratch_size(w.as), RTR_SCRATCH_BUFFER_USAGE);
+    }
+    std::vector<std::thread> threads;
+    for (auto& w : workers) {
+        threads.emplace_back([&, this] {
+            VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
+            vk->BeginCommandBuffer(w.cmd, &begin);
+            EXPECT_EQ(rtrBeginRecorder(w.recorder, w.cmd), VK_SUCCESS);
+            EXPECT_EQ(rtrCmdBuildAccelerationStructure(w.recorder, &info, VK_NULL_HANDLE, 0, VK_FALSE, w.as, nullptr,
+                                                       w.scratch.handle, 0),
+                      VK_SUCCESS);
+            VkMemoryBarrier b{VK_STRUCTURE_TYPE_MEMORY_BARRIER, nullptr, VK_ACCESS_MEMORY_WRITE_BIT, VK_ACCESS_HOST_READ_BIT};
+            vk->CmdPipelineBarrier(w.cmd, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, VK_PIPELINE_STAGE_HOST_BIT, 0, 1, &b, 0,
+                                   nullptr, 0, nullptr);
+            vk->EndCommandBuffer(w.cmd);
+        });
+    }
+    for (auto& t : threads) t.join();
+    for (auto& w : workers) {
+        VkSubmitInfo submit{VK_STRUCTURE_TYPE_SUBMIT_INFO};
+        submit.commandBufferCount = 1;
+        submit.pCommandBuffers = &w.cmd;
+        vk->QueueSubmit(vk->queue, 1, &submit, VK_NULL_HANDLE);
+    }
+    vk->QueueWaitIdle(vk->queue);
+    for (auto& w : workers) {
+        TreeFacts facts;
+        check_structure(scene, w.as, facts);
+        EXPECT_EQ(facts.slots.size(), 300u);
+        rtrDestroyRecorder(rtr, w.recorder, nullptr);
+        vk->DestroyCommandPool(vk->device, w.pool, nullptr);
+        vk->destroy(w.scratch);
+    }
+}
+
+TEST_F(LifetimeTest, SupportNamesItsRequirements) {
+    RtrPhysicalDeviceSupport support;
+    ASSERT_EQ(rtrGetPhysicalDeviceSupport(vk->instance, vk->physical_device, vk->get_instance_proc_addr, &support), VK_SUCCESS);
+    EXPECT_TRUE(support.supported);
+    ASSERT_GT(support.requirementCount, 5u);
+    for (uint32_t i = 0; i < support.requirementCount; i++) {
+        EXPECT_NE(support.requirements[i].name[0], 0);
+        EXPECT_TRUE(support.requirements[i].met) << support.requirements[i].name;
+    }
+    EXPECT_EQ(support.recommended.workgroupSize % 32, 0u);
+    VkPhysicalDeviceRayTracingPropertiesNV p{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_TRACING_PROPERTIES_NV};
+    rtrGetRayTracingProperties(rtr, &p);
+    EXPECT_EQ(p.shaderGroupHandleSize, 32u);
+    EXPECT_EQ(p.maxRecursionDepth, 31u);
+    EXPECT_EQ(p.shaderGroupBaseAlignment, 64u);
+}
+
+TEST_F(LifetimeTest, EnumsBecomeValidOnes) {
+    EXPECT_EQ(rtrTranslateBufferUsage(VK_BUFFER_USAGE_RAY_TRACING_BIT_NV | VK_BUFFER_USAGE_VERTEX_BUFFER_BIT) &
+                  VK_BUFFER_USAGE_RAY_TRACING_BIT_NV, 0u);
+    EXPECT_TRUE(rtrTranslateBufferUsage(VK_BUFFER_USAGE_RAY_TRACING_BIT_NV) & VK_BUFFER_USAGE_STORAGE_BUFFER_BIT);
+    EXPECT_EQ(rtrTranslateBufferUsage(VK_BUFFER_USAGE_VERTEX_BUFFER_BIT), VkBufferUsageFlags(VK_BUFFER_USAGE_VERTEX_BUFFER_BIT));
+    EXPECT_EQ(rtrTranslatePipelineStages(VK_PIPELINE_STAGE_RAY_TRACING_SHADER_BIT_NV),
+              VkPipelineStageFlags(VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT));
+    EXPECT_EQ(rtrTranslateShaderStages(VK_SHADER_STAGE_RAYGEN_BIT_NV | VK_SHADER_STAGE_VERTEX_BIT),
+              VkShaderStageFlags(VK_SHADER_STAGE_COMPUTE_BIT | VK_SHADER_STAGE_VERTEX_BIT));
+    EXPECT_EQ(rtrTranslateShaderStages(VK_SHADER_STAGE_ALL), VkShaderStageFlags(VK_SHADER_STAGE_ALL));
+    EXPECT_EQ(rtrTranslateAccess(VK_ACCESS_ACCELERATION_STRUCTURE_READ_BIT_NV), VkAccessFlags(VK_ACCESS_SHADER_READ_BIT));
+    EXPECT_EQ(rtrTranslateDescriptorType(VK_DESCRIPTOR_TYPE_ACCELERATION_STRUCTURE_NV), VK_DESCRIPTOR_TYPE_STORAGE_BUFFER);
+    EXPECT_EQ(rtrTranslateDescriptorType(VK_DESCRIPTOR_TYPE_SAMPLER), VK_DESCRIPTOR_TYPE_SAMPLER);
+}
+
+}  // namespace
