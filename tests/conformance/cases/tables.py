@@ -82,7 +82,7 @@ LAYOUTS = [
      [("unpackDouble2x32(b).x", 8), ("unpackDouble2x32(b).y", 12), ("uint(c >> 32)", 20)],
      ("GL_EXT_shader_explicit_arithmetic_types_int64",)),
     ("array-dynamic", "layout(shaderRecordNV, std430) buffer R { uint n; uint pad[3]; vec4 table[4]; };\n",
-     [("floatBitsToUint(table[n - 0x100u].y)", 36), ("floatBitsToUint(table[(n & 3u) + 2u].z)", 56)], ()),
+     [("floatBitsToUint(table[n - 0x100u].y)", 36), ("floatBitsToUint(table[(n & 3u) + 2u].z)", 72)], ()),
 ]
 WORDS = [0x100 + i if i else 0x101 for i in range(32)]
 WORDS[0] = 0x101
@@ -93,12 +93,12 @@ for name, decl, reads, extensions in LAYOUTS:
         dump = "".join(f"    r[{i}] = {e};\n" for i, (e, _) in enumerate(reads))
         at = {s: (decl, dump) if s == stage else ("", "") for s in ("rgen", "rchit", "rmiss", "rcall", "rahit", "rint")}
         stages = {
-            "rgen": nv(P + "layout(location = 0) callableDataNV uint c;\n" + at["rgen"][0] + "void main() {\n    p = 0u; c = 0u;\n" + at["rgen"][1] +
+            "rgen": nv(P + "layout(location = 0) callableDataNV uint tool;\n" + at["rgen"][0] + "void main() {\n    p = 0u; tool = 0u;\n" + at["rgen"][1] +
                        (f"    traceNV(scene, 0, {'0' if stage == 'rmiss' else '0xff'}, 1, 0, 1, {RAY}, 0);\n" if stage not in ("rgen", "rcall") else "") +
                        ("    executeCallableNV(1, 0);\n" if stage == "rcall" else "") + "}\n", extensions=extensions),
             "rmiss": nv(IN + at["rmiss"][0] + "void main() {\n" + at["rmiss"][1] + "}\n", scene=False, extensions=extensions),
             "rchit": nv(IN + at["rchit"][0] + "void main() {\n" + at["rchit"][1] + "}\n", scene=False, extensions=extensions),
-            "rcall": nv("layout(location = 0) callableDataInNV uint c;\n" + at["rcall"][0] + "void main() {\n" + at["rcall"][1] + "}\n",
+            "rcall": nv("layout(location = 0) callableDataInNV uint tool;\n" + at["rcall"][0] + "void main() {\n" + at["rcall"][1] + "}\n",
                         scene=False, extensions=extensions),
         }
         group = {"name": "hit", "closest": "rchit"}
