@@ -22,10 +22,15 @@ constexpr uint32_t kContracted[] = {
 #include "lab_contracted.inc"
 };
 
+constexpr uint32_t kProbe[] = {
+#include "lab_probe.inc"
+};
+
 std::vector<uint32_t> module_words(Variant variant) {
     std::vector<uint32_t> words;
     if (variant == Variant::Watertight) words.assign(std::begin(kWatertight), std::end(kWatertight));
     if (variant == Variant::Fast) words.assign(std::begin(kFast), std::end(kFast));
+    if (variant == Variant::Probe) words.assign(std::begin(kProbe), std::end(kProbe));
     if (variant == Variant::Contracted) {
         words.assign(std::begin(kContracted), std::end(kContracted));
         contract(words);
@@ -37,6 +42,7 @@ std::vector<uint32_t> module_words(Variant variant) {
 
 constexpr uint32_t kControlWords = RTC_CTRL_HEADER_WORDS + 64;
 constexpr uint32_t kSaveWords = 96;
+constexpr uint32_t kResultWords = 16;
 
 }  // namespace
 
@@ -61,7 +67,7 @@ struct DeviceTracer::State {
     VkDescriptorPool pool = VK_NULL_HANDLE;
     std::array<VkDescriptorSet, 2> sets{};
     VkBufferView view = VK_NULL_HANDLE;
-    tools::Buffer heap, params, empty, control, scratch, rays, results;
+    tools::Buffer heap, params, empty, sbt, control, scratch, rays, results;
     uint32_t root = 0;
     size_t capacity = 0;
 
@@ -119,6 +125,7 @@ DeviceTracer::DeviceTracer(const tools::Context& context, const TracerOptions& o
                                options.triangles,
                                options.resumable};
     std::array<VkSpecializationMapEntry, std::size(ids)> entries;
+    // The workgroup size stays at its default of 64.
     for (uint32_t i = 0; i < entries.size(); ++i) entries[i] = {ids[i], i * 4, 4};
     const VkSpecializationInfo specialization{uint32_t(entries.size()), entries.data(), sizeof values, values};
     VkComputePipelineCreateInfo info{VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO};
@@ -187,36 +194,65 @@ void DeviceTracer::set_scene(const HostScene& scene) {
 }
 
 std::vector<RayResult> DeviceTracer::trace(const std::vector<Ray>& rays) {
-    State& s = *state_;
     const uint32_t lanes = (uint32_t(rays.size()) + 63) / 64 * 64;
+    std::vector<uint32_t> params(RTC_PARAM_QUADS * 4);
+    params[RTC_PARAM_RAYGEN_OFFSET] = state_->root;
+    params[RTC_PARAM_WIDTH] = uint32_t(rays.size());
+    params[RTC_PARAM_HEIGHT] = 1;
+    params[RTC_PARAM_DEPTH] = 1;
+    params[RTC_PARAM_LANE_COUNT] = lanes;
+    static_assert(sizeof(RayResult) == kResultWords * 4);
+    dispatch(params, rays.data(), rays.size() * sizeof(Ray), lanes, lanes / 64, 1);
+    std::vector<RayResult> results(rays.size());
+    std::memcpy(results.data(), state_->results.mapped, results.size() * sizeof(RayResult));
+    return results;
+}
+
+std::vector<uint32_t> DeviceTracer::probe(const std::vector<uint32_t>& params, const std::vector<uint32_t>& sbt,
+                                          const std::vector<uint32_t>& indices, uint32_t groups_x, uint32_t groups_y) {
+    State& s = *state_;
+    set_scene({.heap = std::vector<uint32_t>(64), .root = 0, .world_to_object = {}, .max_depth = 0});
+    s.sbt = tools::Buffer(s.context, sbt.size() * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, tools::MemoryKind::Host);
+    std::memcpy(s.sbt.mapped, sbt.data(), sbt.size() * 4);
+    for (uint32_t b = RTC_BINDING_SBT_RAYGEN; b <= RTC_BINDING_SBT_CALLABLE; ++b) {
+        s.write(0, b, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, s.sbt);
+    }
+    dispatch(params, indices.data(), indices.size() * 4, uint32_t(indices.size()), groups_x, groups_y);
+    std::vector<uint32_t> results(indices.size() * kResultWords);
+    std::memcpy(results.data(), s.results.mapped, results.size() * 4);
+    return results;
+}
+
+std::vector<uint32_t> DeviceTracer::control() const {
+    const uint32_t* words = static_cast<const uint32_t*>(state_->control.mapped);
+    return {words, words + kControlWords};
+}
+
+void DeviceTracer::dispatch(const std::vector<uint32_t>& params, const void* input, size_t input_bytes, uint32_t lanes,
+                            uint32_t groups_x, uint32_t groups_y) {
+    State& s = *state_;
     if (lanes > s.capacity) {
         const VkBufferUsageFlags storage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
         const bool saves = s.options.resumable && s.options.step_budget != 0xffffffffu;
+        const uint32_t save_words = s.options.variant == Variant::Probe ? 4 : (saves ? kSaveWords : 0);
         s.rays = tools::Buffer(s.context, lanes * sizeof(Ray), storage, tools::MemoryKind::Host);
-        s.results = tools::Buffer(s.context, lanes * sizeof(RayResult), storage, tools::MemoryKind::Readback);
-        s.scratch = tools::Buffer(s.context, saves ? VkDeviceSize(lanes) * kSaveWords * 4 : 16, storage,
-                                  tools::MemoryKind::Device);
+        s.results = tools::Buffer(s.context, lanes * kResultWords * 4, storage, tools::MemoryKind::Readback);
+        s.scratch = tools::Buffer(s.context, VkDeviceSize(lanes) * save_words * 4, storage, tools::MemoryKind::Device);
         s.write(1, 0, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, s.rays);
         s.write(1, 1, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, s.results);
         s.write(0, RTC_BINDING_SCRATCH, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, s.scratch);
         s.capacity = lanes;
     }
-    std::memcpy(s.rays.mapped, rays.data(), rays.size() * sizeof(Ray));
+    std::memcpy(s.rays.mapped, input, input_bytes);
     std::memset(s.control.mapped, 0, kControlWords * 4);
-    uint32_t params[RTC_PARAM_QUADS * 4] = {};
-    params[RTC_PARAM_RAYGEN_OFFSET] = s.root;
-    params[RTC_PARAM_WIDTH] = uint32_t(rays.size());
-    params[RTC_PARAM_HEIGHT] = 1;
-    params[RTC_PARAM_DEPTH] = 1;
-    params[RTC_PARAM_LANE_COUNT] = lanes;
-    std::memcpy(s.params.mapped, params, sizeof params);
+    std::memcpy(s.params.mapped, params.data(), params.size() * 4);
     tools::GpuTimer timer(s.context);
     s.context.run([&](VkCommandBuffer commands) {
         timer.reset(commands);
         vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, s.pipeline);
         vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, s.layout, 0, 2, s.sets.data(), 0, nullptr);
         timer.begin(commands);
-        vkCmdDispatch(commands, lanes / 64, 1, 1);
+        vkCmdDispatch(commands, groups_x, groups_y, 1);
         timer.end(commands);
         tools::full_barrier(commands);
     });
@@ -225,9 +261,6 @@ std::vector<RayResult> DeviceTracer::trace(const std::vector<Ray>& rays) {
     error = control[RTC_CTRL_ERROR];
     error_count = control[RTC_CTRL_ERROR_COUNT];
     error_detail = control[RTC_CTRL_ERROR_DETAIL];
-    std::vector<RayResult> results(rays.size());
-    std::memcpy(results.data(), s.results.mapped, results.size() * sizeof(RayResult));
-    return results;
 }
 
 }  // namespace rtc::lab

@@ -41,7 +41,8 @@ struct RayResult {
 
 constexpr uint32_t kNoInstance = 0xffffffffu;
 
-enum class Variant { Watertight, Fast, Contracted };
+// Probe traces nothing: it asks for lanes and records (lab_probe.comp).
+enum class Variant { Watertight, Fast, Contracted, Probe };
 Variant parse_variant(std::string_view name);  // throws tools::Error
 const char* variant_name(Variant variant);
 
@@ -65,12 +66,20 @@ class DeviceTracer {
     void set_scene(const HostScene& scene);
     std::vector<RayResult> trace(const std::vector<Ray>& rays);
 
+    // Variant::Probe: a dispatch of `groups_x` by `groups_y` with these parameter and SBT words.
+    // `indices` has one entry a lane; results are 16 words a lane.
+    std::vector<uint32_t> probe(const std::vector<uint32_t>& params, const std::vector<uint32_t>& sbt,
+                                const std::vector<uint32_t>& indices, uint32_t groups_x, uint32_t groups_y);
+    std::vector<uint32_t> control() const;  // control block words of the last dispatch
+
     double seconds = 0;          // of the last trace, on the device
     uint32_t error = 0;          // launch error of the last trace
     uint32_t error_count = 0;
     uint32_t error_detail = 0;
 
   private:
+    void dispatch(const std::vector<uint32_t>& params, const void* input, size_t input_bytes, uint32_t lanes,
+                  uint32_t groups_x, uint32_t groups_y);
     struct State;
     std::unique_ptr<State> state_;
 };
