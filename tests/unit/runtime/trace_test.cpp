@@ -288,7 +288,7 @@ class ResumeTest : public TraceTest {
         ASSERT_EQ(make_pipeline(code, 8, &options, &specialization), VK_SUCCESS);
 
         // Hit record 1 carries data; the table lies at an odd place of its buffer.
-        uint32_t data[3] = {11, 22, 33};
+        uint32_t data[4] = {11, 22, 33, 44};
         RtrSbtRecord raygen{0, 0, nullptr}, hits[2] = {{1, 4, &data[0]}, {1, 12, &data[1]}};
         RtrSbtInfo sbt_info{};
         sbt_info.raygenCount = 1;
