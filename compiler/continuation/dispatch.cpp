@@ -1,4 +1,4 @@
-// The entry point: launch, dispatch loop, traversal state, word stack, and the
+// The entry point: launch, dispatch loops, traversal state, word stack, and the
 // switch over all states.
 //
 // Shaped by what lavapipe's LLVM compiles fast (docs/architecture.md): one place
@@ -211,13 +211,6 @@ Function Machine::build_main(const std::vector<Function>& stage_functions) {
     p.module.set_name(main.id(), "main");
     Code code(*this);
 
-    if (traces) {
-        State traverse;
-        traverse.id = kStateTraverse;
-        traverse.name = "traverse";
-        traverse.blocks = traverse_state(*this);
-        states.push_back(std::move(traverse));
-    }
     std::sort(states.begin(), states.end(), [](const State& a, const State& b) { return a.id < b.id; });
     for (const State& s : states) p.module.set_name(s.blocks.front().label, "state." + std::to_string(s.id) + "." + s.name);
 
@@ -269,11 +262,23 @@ Function Machine::build_main(const std::vector<Function>& stage_functions) {
         start();
     }
 
-    // Dispatch loop.
-    const Id header = p.module.new_id(), body = p.module.new_id(), exit = p.module.new_id();
+    // Two loops: shading states run until every lane of the group wants to trace or is done, then
+    // traversal runs for all of them together. (Drivers that execute untaken branches masked run
+    // shading code only when some lane needs it.)
+    const Id again = p.module.new_id(), exit = p.module.new_id(), next = p.module.new_id();
+    const Id header = p.module.new_id(), body = p.module.new_id(), shaded = p.module.new_id();
+    auto count_turn = [&] {
+        if (!resumable) return;
+        Emitter e = code.e();
+        const Id turns = variable("rtc_turns");
+        e.store(turns, e.add(e.load(u32, turns), p.constant_u32(1)));
+    };
+    code.e().effect(Op::OpBranch, {again});
+    code.begin(again);
+    code.e().effect(Op::OpLoopMerge, {exit, next, 0});
     code.e().effect(Op::OpBranch, {header});
     code.begin(header);
-    code.e().effect(Op::OpLoopMerge, {exit, dispatch, 0});
+    code.e().effect(Op::OpLoopMerge, {shaded, dispatch, 0});
     code.e().effect(Op::OpBranch, {body});
     code.begin(body);
     if (has_stack) {
@@ -315,19 +320,18 @@ Function Machine::build_main(const std::vector<Function>& stage_functions) {
     }
     code.e().store(leave, p.constant_bool(false));
     const Id current = code.load(state);
-    const Id running = p.module.new_id(), done = p.module.new_id();
-    Id finished = code.equal(current, kStateDone);
-    if (resumable) {
+    const Id running = p.module.new_id(), stop = p.module.new_id();
+    count_turn();
+    {
         Emitter e = code.e();
-        const Id turns = variable("rtc_turns");
-        const Id spent = out_of_budget(e);
-        e.store(turns, e.add(e.load(u32, turns), p.constant_u32(1)));
-        finished = e.value(Op::OpLogicalOr, p.bool_type(), {finished, spent});
+        static_assert(kStateDone < kFirstEntry && kStateTraverse < kFirstEntry);
+        Id wait = e.value(Op::OpULessThan, p.bool_type(), {current, p.constant_u32(kFirstEntry)});
+        if (resumable) wait = e.value(Op::OpLogicalOr, p.bool_type(), {wait, out_of_budget(e)});
+        e.effect(Op::OpSelectionMerge, {running, 0});
+        e.effect(Op::OpBranchConditional, {wait, stop, running});
     }
-    code.e().effect(Op::OpSelectionMerge, {running, 0});
-    code.e().effect(Op::OpBranchConditional, {finished, done, running});
-    code.begin(done);
-    code.e().effect(Op::OpBranch, {exit});
+    code.begin(stop);
+    code.e().effect(Op::OpBranch, {shaded});
     code.begin(running);
 
     if (states.size() <= 16) {
@@ -351,6 +355,33 @@ Function Machine::build_main(const std::vector<Function>& stage_functions) {
     }
     code.begin(dispatch);
     code.e().effect(Op::OpBranch, {header});
+    code.begin(shaded);
+    {
+        Emitter e = code.e();
+        Id leave_loop = e.value(Op::OpINotEqual, p.bool_type(), {e.load(u32, state), p.constant_u32(kStateTraverse)});
+        if (resumable) leave_loop = e.value(Op::OpLogicalOr, p.bool_type(), {leave_loop, out_of_budget(e)});
+        const Id trace = p.module.new_id(), done = p.module.new_id();
+        e.effect(Op::OpSelectionMerge, {trace, 0});
+        e.effect(Op::OpBranchConditional, {leave_loop, done, trace});
+        code.begin(done);
+        code.e().effect(Op::OpBranch, {exit});
+        code.begin(trace);
+    }
+    count_turn();
+    if (traces) {
+        const Id shading = dispatch;
+        dispatch = next;
+        std::vector<Block> blocks = traverse_state(*this);
+        dispatch = shading;
+        p.module.set_name(blocks.front().label, "state.1.traverse");
+        code.e().effect(Op::OpBranch, {blocks.front().label});
+        code.blocks.insert(code.blocks.end(), std::make_move_iterator(blocks.begin()),
+                           std::make_move_iterator(blocks.end()));
+    } else {
+        code.e().effect(Op::OpBranch, {next});
+    }
+    code.begin(next);
+    code.e().effect(Op::OpBranch, {again});
     code.begin(exit);
     if (resumable) {
         Emitter e = code.e();
