@@ -42,8 +42,8 @@ Scene cornell() {
     const uint32_t white = add_material(scene, {0.73f, 0.71f, 0.68f});
     const uint32_t red = add_material(scene, {0.63f, 0.065f, 0.05f});
     const uint32_t green = add_material(scene, {0.14f, 0.45f, 0.091f});
-    const uint32_t lamp = add_material(scene, {0.78f, 0.78f, 0.78f}, 0, 1, {17.0f, 12.0f, 5.0f});
-    const uint32_t metal = add_material(scene, {0.95f, 0.79f, 0.5f}, 1.0f, 0.25f);
+    const uint32_t lamp = add_material(scene, {0.78f, 0.78f, 0.78f}, 0, 1, {24.0f, 18.0f, 10.0f});
+    const uint32_t glaze = add_material(scene, {0.2f, 0.32f, 0.62f}, 0.0f, 0.35f);
     Mesh room = make_quad({-1, -1, -1}, {0, 0, 2}, {2, 0, 0}, white);    // floor
     append(room, make_quad({-1, 1, -1}, {2, 0, 0}, {0, 0, 2}, white));   // ceiling
     append(room, make_quad({-1, -1, -1}, {2, 0, 0}, {0, 2, 0}, white));  // back
@@ -52,14 +52,14 @@ Scene cornell() {
     place(scene, add_mesh(scene, room, "room"));
     // Just below the ceiling: coplanar surfaces would make ties of every hit there.
     place(scene,
-          add_mesh(scene, make_quad({-0.24f, 0.995f, -0.22f}, {0.48f, 0, 0}, {0, 0, 0.38f}, lamp), "lamp"));
+          add_mesh(scene, make_quad({-0.32f, 0.995f, -0.3f}, {0.64f, 0, 0}, {0, 0, 0.6f}, lamp), "lamp"));
     const uint32_t block = add_mesh(scene, make_box({-0.3f, 0, -0.3f}, {0.3f, 0.6f, 0.3f}, white), "block");
     glm::mat4 tall = glm::translate(glm::mat4(1), {-0.35f, -1, -0.3f});
     tall = glm::scale(glm::rotate(tall, glm::radians(18.0f), {0, 1, 0}), {1, 2, 1});
     place(scene, block, tall);
     glm::mat4 small = glm::translate(glm::mat4(1), {0.35f, -1, 0.35f});
     place(scene, block, glm::rotate(small, glm::radians(-17.0f), {0, 1, 0}));
-    const uint32_t ball = add_mesh(scene, make_icosphere(0.22f, 4, metal), "ball");
+    const uint32_t ball = add_mesh(scene, make_icosphere(0.22f, 4, glaze), "ball");
     place(scene, ball, glm::translate(glm::mat4(1), {0.35f, -0.18f, 0.35f}));
     scene.camera = {{0, 0, 3.9f}, {0, 0, 0}, {0, 1, 0}, glm::radians(40.0f)};
     scene.finish(true);

@@ -173,7 +173,7 @@ TEST_F(Images, OcclusionByAWallIsItsFormFactor) {
         }
         const Statistics found = statistics(residuals);
         EXPECT_NEAR(found.mean, 0.0, 4.5 * found.standard_error) << "column " << column;
-        EXPECT_LT(found.standard_error, 0.003);
+        EXPECT_LT(found.standard_error, 0.008);
     }
 }
 
