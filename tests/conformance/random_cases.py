@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Random well-defined pipelines with their expected output.
 
-  random_cases.py FOLDER FIRST_SEED COUNT
+  random_cases.py FOLDER FIRST_SEED COUNT [SIZE]      SIZE 1 (default) to 3: statements a shader
 
 Each seed becomes a case file: ray generation, closest-hit, miss, any-hit and callable shaders made of nested
 control flow, helper functions, traces and callables at random places, and live values of random types. Every
@@ -33,11 +33,6 @@ class Break(Exception):
 
 class Continue(Exception):
     pass
-
-
-class Return(Exception):
-    def __init__(self, value=None):
-        self.value = value
 
 
 class Type:
@@ -100,7 +95,7 @@ class Stage:
         self.types = [rng.choice(TYPES) for _ in range(rng.randint(3, 40 if rng.random() < 0.4 else 8))]
         self.payloads = rng.randint(1, 2) if kind in ("rgen", "rchit", "rmiss") else 0
         self.functions, self.loop_id = [], 0
-        self.budget = rng.randint(4, 14)  # statements
+        self.budget = rng.randint(2, 5) * program.size  # statements
 
     # -- expressions: (text, eval(frame)) of a uint
     def expression(self, depth=0):
@@ -191,7 +186,7 @@ class Stage:
                 "{ uint e = c.x; " + t.store[0](f"v{i}", "e") + " }"], run
 
     def block(self, depth, loop):
-        parts = [self.statement(depth, loop) for _ in range(self.rng.randint(1, 3))]
+        parts = [self.statement(depth, loop) for _ in range(self.rng.randint(1, 2 + (self.program.size > 1)))]
         lines = [line for text, _ in parts for line in text]
 
         def run(f):
@@ -348,8 +343,6 @@ class Stage:
         if self.kind != "rahit":
             text += "layout(location = 7) callableDataNV C c;\n"
         text += "uint depth;\n" + "".join(f"{t.name} v{i}{t.array};\n" for i, t in enumerate(self.types))
-        for function in self.functions:  # made inside out: a function calls only later ones
-            pass
         # Prototypes first, for helpers call helpers.
         text += "".join(f[0].replace(" {", ";") + "\n" for f in self.functions)
         text += "".join("\n".join(f) + "\n" for f in self.functions)
@@ -396,7 +389,8 @@ class Stage:
 
 
 class Program:
-    def __init__(self, seed):
+    def __init__(self, seed, size):
+        self.size = size
         self.rng = rng = random.Random(seed)
         self.extra = rng.choice(["", "bool unused;", "float unused[3];", "mat2 unused; bool also;"])
         self.callables, self.calls = [], 0
@@ -444,13 +438,14 @@ class Program:
 
 def main():
     folder, first, count = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+    size = int(sys.argv[4]) if len(sys.argv) > 4 else 1
     os.makedirs(os.path.join(folder, "random"), exist_ok=True)
     sys.setrecursionlimit(10000)
     written = 0
     for seed in range(first, first + count):
         for attempt in range(200):  # too long: the same seed draws again
             try:
-                case = Program(seed * 1000 + attempt).case(f"random/{seed}")
+                case = Program(seed * 1000 + attempt, size).case(f"random/{seed}")
                 break
             except TooLong:
                 continue

@@ -17,7 +17,7 @@ struct CommandLine {
         save_oracle;
     bool compare = false, validate = false, list = false, verbose = false, optimize = false, print = false;
     uint32_t recursion = 0, callable_depth = 0, repeats = 1, budget = 0, timeout = 120;
-    int resumable = -1;
+    int resumable = -1, fetch = -1;
     Tolerance tolerance;
 };
 
@@ -183,6 +183,7 @@ int run(const CommandLine& c) {
     rtc.optimize = c.optimize;
     rtc.resumable = c.resumable;
     rtc.step_budget = c.budget;
+    rtc.fetch = c.fetch;
     rtc.save_module = c.save;
     if (!c.suite.empty()) {
         SuiteOptions suite;
@@ -283,6 +284,7 @@ int main(int argc, char** argv) {
     app.add_option("--repeat", c.repeats, "trace so many times and report the fastest");
     app.add_flag("-O", c.optimize, "let rtc optimise the module");
     app.add_option("--resumable", c.resumable, "0 or 1: compile lanes that can suspend (default: as the device needs)");
+    app.add_option("--fetch", c.fetch, "acceleration structure through 0 texels, 1 a storage buffer");
     app.add_option("--step-budget", c.budget, "loop turns before a lane suspends");
     app.add_option("--save-module", c.save, "write the module rtc linked");
     app.add_flag("--validate", c.validate, "run under the Khronos validation layer");

@@ -172,6 +172,7 @@ class RtcExecutor final : public Executor {
         VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, push_bytes};
         RtrTraceOptions trace_options = RTR_TRACE_OPTIONS_DEFAULT;
         if (options_.step_budget) trace_options.stepBudget = options_.step_budget;
+        if (options_.fetch >= 0) trace_options.fetch = RtrFetch(options_.fetch);
         RtrRayTracingPipelineCreateInfo info{};
         info.pCode = module_.data();
         info.codeSize = module_.size() * 4;
