@@ -385,7 +385,7 @@ TEST_F(LabTest, DeepChainsFitTheStack) {
         blas.geometries[0].triangles.push_back({Vec3{0, 0, s}, Vec3{s, 0, s}, Vec3{0, s, s}});
     }
     BuildOptions options;
-    options.chain = true;
+    options.chain = 45;
     options.leaf_size = 1;
     std::vector<Instance> instances(200);
     const HostScene scene = build_scene({blas}, instances, options);
@@ -401,6 +401,37 @@ TEST_F(LabTest, DeepChainsFitTheStack) {
                                 {0, 0, i % 2 ? -1.0f : 1.0f}));
     }
     for (const RayResult& r : tracer.trace(rays)) EXPECT_NE(r.instance, kNoInstance);
+    EXPECT_EQ(tracer.error, RTC_LAUNCH_ERROR_NONE);
+}
+
+TEST_F(LabTest, TreesDeeperThanLegalAreALaunchError) {
+    Blas blas;
+    blas.geometries.resize(1);
+    // The far one is split off at each level, so that descending fills the stack.
+    for (int i = 0; i < 400; ++i) {
+        const float z = 0.001f * float(i);
+        blas.geometries[0].triangles.push_back({Vec3{0, 0, z}, Vec3{1, 0, z}, Vec3{0, 1, z}});
+    }
+    BuildOptions options;
+    options.chain = 390;
+    options.leaf_size = 1;
+    DeviceTracer& tracer = shared_tracer();
+    tracer.set_scene(build_scene({blas}, {{}}, options));
+    tracer.trace({make_ray({0.25f, 0.25f, 2}, {0, 0, -1})});
+    EXPECT_EQ(tracer.error, RTC_LAUNCH_ERROR_STACK);
+    EXPECT_EQ(tracer.trace({make_ray({5, 5, 2}, {0, 0, -1})})[0].instance, kNoInstance);
+    EXPECT_EQ(tracer.error, RTC_LAUNCH_ERROR_NONE);
+}
+
+TEST_F(LabTest, ManyPrimitivesOnOneSpot) {
+    Blas blas;
+    blas.geometries.resize(1);
+    blas.geometries[0].triangles.assign(20000, kTriangle);
+    DeviceTracer& tracer = shared_tracer();
+    tracer.set_scene(build_scene({blas}, {{}}));
+    const RayResult r = tracer.trace({make_ray({0.25f, 0.25f, 2}, {0, 0, -1})})[0];
+    EXPECT_EQ(r.t, 2.0f);
+    EXPECT_LT(r.primitive, 20000u);
     EXPECT_EQ(tracer.error, RTC_LAUNCH_ERROR_NONE);
 }
 

@@ -55,7 +55,7 @@ Bounds inflated(Bounds b, const Bounds& whole, float by) {
 struct Builder {
     const std::vector<Bounds>& bounds;
     uint32_t leaf_size;
-    bool chain;
+    uint32_t chain;
     std::vector<uint32_t> order;  // slots, leaf after leaf
     std::vector<std::array<Child, 2>> nodes;
     uint32_t depth = 0;
@@ -67,8 +67,7 @@ struct Builder {
     }
 
     size_t split(size_t begin, size_t end, uint32_t level) {
-        // What is left must fit below: 2^14 primitives.
-        if (chain && level + 14 < RTC_MAX_DEPTH) return begin + 1;
+        if (level < chain) return begin + 1;
         Bounds centres;
         for (size_t i = begin; i < end; ++i) {
             const Bounds& b = bounds[order[i]];
