@@ -12,9 +12,9 @@ rtc::FrontendOptions frontend_options(const rtcc_options& options) {
     frontend.include = [resolve = options.resolve, release = options.release,
                         user_data = options.include_user_data](const rtc::IncludeRequest& request) {
         rtc::IncludeAnswer answer;
-        rtcc_include_result* found =
-            resolve(user_data, request.name.c_str(), request.local ? RTCC_INCLUDE_QUOTED : RTCC_INCLUDE_ANGLED,
-                    request.includer.c_str(), request.depth);
+        rtcc_include_result* found = resolve(user_data, request.name.c_str(),
+                                             request.local ? RTCC_INCLUDE_QUOTED : RTCC_INCLUDE_ANGLED,
+                                             request.includer.c_str(), request.depth);
         if (!found) {
             answer.text = "cannot find or open include file";
             return answer;
@@ -145,7 +145,8 @@ rtcc_status link_groups(const rtcc_pipeline& pipeline, rtc::PipelineInput& input
     return status;
 }
 
-rtcc_status compile_pipeline(const rtcc_pipeline& pipeline, const rtcc_options& options, rtcc_result& result) {
+rtcc_status compile_pipeline(const rtcc_pipeline& pipeline, const rtcc_options& options,
+                             rtcc_result& result) {
     if (pipeline.stages.empty()) {
         result.error("pipeline-empty", "", 0, "the pipeline has no stages");
         return RTCC_STATUS_LINK_ERROR;
@@ -158,8 +159,8 @@ rtcc_status compile_pipeline(const rtcc_pipeline& pipeline, const rtcc_options& 
         rtc::StageInput& added = input.stages.emplace_back();
         added.name = stage.name;
         added.file = stage.file;
-        rtcc_status one = stage.is_glsl ? glsl_stage(stage, frontend, added, result)
-                                        : spirv_stage(stage, added, result);
+        rtcc_status one =
+            stage.is_glsl ? glsl_stage(stage, frontend, added, result) : spirv_stage(stage, added, result);
         if (one == RTCC_STATUS_SUCCESS) one = specialize(stage, added, result);
         if (status == RTCC_STATUS_SUCCESS) status = one;
     }
@@ -203,10 +204,12 @@ rtcc_result_t rtcc_compile_pipeline(rtcc_const_compiler_t compiler, rtcc_const_p
 rtcc_result_t rtcc_compile_stage(rtcc_const_compiler_t compiler, rtcc_stage stage, const char* file,
                                  const char* source, size_t source_size, rtcc_const_options_t options) {
     return rtcc::make_result(options, [&](rtcc_result& result, const rtcc_options& chosen) {
-        if (!compiler || (!source && source_size) || !rtcc::valid_stage(stage)) return RTCC_STATUS_INVALID_ARGUMENT;
+        if (!compiler || (!source && source_size) || !rtcc::valid_stage(stage))
+            return RTCC_STATUS_INVALID_ARGUMENT;
         rtc::FrontendOptions frontend = frontend_options(chosen);
         frontend.debug_info = chosen.link.debug_info;
-        rtc::FrontendResult compiled = rtc::compile_glsl(source_of(stage, file, source, source_size), frontend);
+        rtc::FrontendResult compiled =
+            rtc::compile_glsl(source_of(stage, file, source, source_size), frontend);
         const rtcc_status status = compiled.ok ? RTCC_STATUS_SUCCESS : front_end_failure(compiled);
         add_dependencies(result, compiled.dependencies);
         append(result, compiled.diagnostics);
@@ -218,7 +221,8 @@ rtcc_result_t rtcc_compile_stage(rtcc_const_compiler_t compiler, rtcc_stage stag
 rtcc_result_t rtcc_preprocess_stage(rtcc_const_compiler_t compiler, rtcc_stage stage, const char* file,
                                     const char* source, size_t source_size, rtcc_const_options_t options) {
     return rtcc::make_result(options, [&](rtcc_result& result, const rtcc_options& chosen) {
-        if (!compiler || (!source && source_size) || !rtcc::valid_stage(stage)) return RTCC_STATUS_INVALID_ARGUMENT;
+        if (!compiler || (!source && source_size) || !rtcc::valid_stage(stage))
+            return RTCC_STATUS_INVALID_ARGUMENT;
         rtc::FrontendResult processed =
             rtc::preprocess_glsl(source_of(stage, file, source, source_size), frontend_options(chosen));
         const rtcc_status status = processed.ok ? RTCC_STATUS_SUCCESS : front_end_failure(processed);

@@ -25,17 +25,19 @@ std::string described(const rtc::SpirvInfo& info) {
 
 }  // namespace
 
-std::optional<rtc::EntryPointInfo> choose_entry(const rtc::SpirvInfo& info, std::optional<rtc::StageKind> kind,
+std::optional<rtc::EntryPointInfo> choose_entry(const rtc::SpirvInfo& info,
+                                                std::optional<rtc::StageKind> kind,
                                                 const std::optional<std::string>& entry, std::string& error) {
     const rtc::EntryPointInfo* found = nullptr;
     size_t count = 0;
     for (const rtc::EntryPointInfo& candidate : info.entry_points) {
-        if (!candidate.kind || (kind && candidate.kind != kind) || (entry && candidate.name != *entry)) continue;
+        if (!candidate.kind || (kind && candidate.kind != kind) || (entry && candidate.name != *entry))
+            continue;
         if (count++ == 0) found = &candidate;
     }
     if (count == 1) return *found;
-    const std::string what = (kind ? std::string(rtcc_stage_name(stage_of(*kind))) : "ray tracing") + " entry point" +
-                             (entry ? " '" + *entry + "'" : "");
+    const std::string what = (kind ? std::string(rtcc_stage_name(stage_of(*kind))) : "ray tracing") +
+                             " entry point" + (entry ? " '" + *entry + "'" : "");
     error = count == 0 ? "the module has no " + what + ": " + described(info)
                        : "the module has more than one " + what + ", name one: " + described(info);
     return std::nullopt;
@@ -58,7 +60,9 @@ rtcc_compiler_t rtcc_compiler_create(void) { return new (std::nothrow) rtcc_comp
 
 void rtcc_compiler_release(rtcc_compiler_t compiler) { delete compiler; }
 
-int rtcc_is_spirv(const void* bytes, size_t size) { return bytes && rtc::looks_like_spirv(bytes, size) ? 1 : 0; }
+int rtcc_is_spirv(const void* bytes, size_t size) {
+    return bytes && rtc::looks_like_spirv(bytes, size) ? 1 : 0;
+}
 
 rtcc_result_t rtcc_module_from_bytes(const char* file, const void* bytes, size_t size) {
     return rtcc::make_result(nullptr, [&](rtcc_result& result, const rtcc_options&) {
@@ -98,7 +102,8 @@ rtcc_stage rtcc_stage_from_file_name(const char* file) {
 rtcc_stage rtcc_stage_from_source(const char* file, const char* source, size_t source_size) {
     if (!source && source_size) return RTCC_STAGE_AUTO;
     try {
-        const auto kind = rtc::stage_kind_from_source(file ? file : "", std::string(source ? source : "", source_size));
+        const auto kind =
+            rtc::stage_kind_from_source(file ? file : "", std::string(source ? source : "", source_size));
         return kind ? rtcc::stage_of(*kind) : RTCC_STAGE_AUTO;
     } catch (...) {
         return RTCC_STAGE_AUTO;
@@ -112,13 +117,20 @@ rtcc_stage rtcc_stage_from_name(const char* name) {
 
 const char* rtcc_stage_name(rtcc_stage stage) {
     switch (stage) {
-        case RTCC_STAGE_RAYGEN: return "rgen";
-        case RTCC_STAGE_INTERSECTION: return "rint";
-        case RTCC_STAGE_ANY_HIT: return "rahit";
-        case RTCC_STAGE_CLOSEST_HIT: return "rchit";
-        case RTCC_STAGE_MISS: return "rmiss";
-        case RTCC_STAGE_CALLABLE: return "rcall";
-        default: return "auto";
+        case RTCC_STAGE_RAYGEN:
+            return "rgen";
+        case RTCC_STAGE_INTERSECTION:
+            return "rint";
+        case RTCC_STAGE_ANY_HIT:
+            return "rahit";
+        case RTCC_STAGE_CLOSEST_HIT:
+            return "rchit";
+        case RTCC_STAGE_MISS:
+            return "rmiss";
+        case RTCC_STAGE_CALLABLE:
+            return "rcall";
+        default:
+            return "auto";
     }
 }
 

@@ -127,7 +127,8 @@ inline rtcc_stage stage_of(rtc::StageKind kind) { return static_cast<rtcc_stage>
 bool valid_stage(rtcc_stage stage);
 
 // Chooses the entry point; nullopt with `error` when none fits.
-std::optional<rtc::EntryPointInfo> choose_entry(const rtc::SpirvInfo& info, std::optional<rtc::StageKind> kind,
+std::optional<rtc::EntryPointInfo> choose_entry(const rtc::SpirvInfo& info,
+                                                std::optional<rtc::StageKind> kind,
                                                 const std::optional<std::string>& entry, std::string& error);
 
 }  // namespace rtcc

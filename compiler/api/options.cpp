@@ -47,7 +47,8 @@ void rtcc_options_release(rtcc_options_t options) { delete options; }
 rtcc_status rtcc_options_add_macro(rtcc_options_t options, const char* name, const char* value) {
     return set(options, [&](rtcc_options& o) {
         const std::string_view text = value ? value : "";
-        if (!is_macro_name(name) || text.find('\n') != std::string_view::npos) return RTCC_STATUS_INVALID_ARGUMENT;
+        if (!is_macro_name(name) || text.find('\n') != std::string_view::npos)
+            return RTCC_STATUS_INVALID_ARGUMENT;
         // GLSL forbids redefinition with another value; the last -D wins.
         std::erase_if(o.frontend.macros, [&](const rtc::Macro& m) { return m.name == name; });
         o.frontend.macros.push_back({name, std::string(text)});
@@ -104,10 +105,17 @@ rtcc_status rtcc_options_set_debug_info(rtcc_options_t options, int enable) {
 rtcc_status rtcc_options_set_optimization(rtcc_options_t options, rtcc_optimization level) {
     return set(options, [&](rtcc_options& o) {
         switch (level) {
-            case RTCC_OPTIMIZATION_NONE: o.link.optimize = rtc::Optimization::None; break;
-            case RTCC_OPTIMIZATION_PERFORMANCE: o.link.optimize = rtc::Optimization::Performance; break;
-            case RTCC_OPTIMIZATION_SIZE: o.link.optimize = rtc::Optimization::Size; break;
-            default: return RTCC_STATUS_INVALID_ARGUMENT;
+            case RTCC_OPTIMIZATION_NONE:
+                o.link.optimize = rtc::Optimization::None;
+                break;
+            case RTCC_OPTIMIZATION_PERFORMANCE:
+                o.link.optimize = rtc::Optimization::Performance;
+                break;
+            case RTCC_OPTIMIZATION_SIZE:
+                o.link.optimize = rtc::Optimization::Size;
+                break;
+            default:
+                return RTCC_STATUS_INVALID_ARGUMENT;
         }
         return RTCC_STATUS_SUCCESS;
     });
@@ -116,11 +124,20 @@ rtcc_status rtcc_options_set_optimization(rtcc_options_t options, rtcc_optimizat
 rtcc_status rtcc_options_set_target_env(rtcc_options_t options, rtcc_target_env target) {
     return set(options, [&](rtcc_options& o) {
         switch (target) {
-            case RTCC_TARGET_AUTO: o.link.target = rtc::TargetEnv::Auto; break;
-            case RTCC_TARGET_VULKAN_1_1: o.link.target = rtc::TargetEnv::Vulkan11; break;
-            case RTCC_TARGET_VULKAN_1_2: o.link.target = rtc::TargetEnv::Vulkan12; break;
-            case RTCC_TARGET_VULKAN_1_3: o.link.target = rtc::TargetEnv::Vulkan13; break;
-            default: return RTCC_STATUS_INVALID_ARGUMENT;
+            case RTCC_TARGET_AUTO:
+                o.link.target = rtc::TargetEnv::Auto;
+                break;
+            case RTCC_TARGET_VULKAN_1_1:
+                o.link.target = rtc::TargetEnv::Vulkan11;
+                break;
+            case RTCC_TARGET_VULKAN_1_2:
+                o.link.target = rtc::TargetEnv::Vulkan12;
+                break;
+            case RTCC_TARGET_VULKAN_1_3:
+                o.link.target = rtc::TargetEnv::Vulkan13;
+                break;
+            default:
+                return RTCC_STATUS_INVALID_ARGUMENT;
         }
         return RTCC_STATUS_SUCCESS;
     });

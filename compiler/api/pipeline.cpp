@@ -57,8 +57,9 @@ int32_t rtcc_pipeline_add_glsl(rtcc_pipeline_t pipeline, rtcc_stage stage, const
     });
 }
 
-int32_t rtcc_pipeline_add_spirv(rtcc_pipeline_t pipeline, rtcc_stage stage, const char* name, const char* file,
-                                const uint32_t* words, size_t word_count, const char* entry) {
+int32_t rtcc_pipeline_add_spirv(rtcc_pipeline_t pipeline, rtcc_stage stage, const char* name,
+                                const char* file, const uint32_t* words, size_t word_count,
+                                const char* entry) {
     if (!pipeline || (!words && word_count) || !rtcc::valid_stage(stage)) return -1;
     return guarded_index([&] {
         rtcc::Stage added;
@@ -69,7 +70,8 @@ int32_t rtcc_pipeline_add_spirv(rtcc_pipeline_t pipeline, rtcc_stage stage, cons
     });
 }
 
-rtcc_status rtcc_pipeline_specialize(rtcc_pipeline_t pipeline, int32_t stage, uint32_t constant_id, uint64_t bits) {
+rtcc_status rtcc_pipeline_specialize(rtcc_pipeline_t pipeline, int32_t stage, uint32_t constant_id,
+                                     uint64_t bits) {
     if (!pipeline || !in_range(*pipeline, stage)) return RTCC_STATUS_INVALID_ARGUMENT;
     return rtcc::guarded([&] {
         auto& values = pipeline->stages[static_cast<size_t>(stage)].specialization;
@@ -95,7 +97,8 @@ int32_t rtcc_pipeline_add_general_group(rtcc_pipeline_t pipeline, const char* na
     return guarded_index([&] {
         rtcc::Group group;
         group.stages[0] = stage;
-        return add_group(pipeline, name, std::move(group), pipeline->stages[static_cast<size_t>(stage)].name.c_str());
+        return add_group(pipeline, name, std::move(group),
+                         pipeline->stages[static_cast<size_t>(stage)].name.c_str());
     });
 }
 

@@ -9,7 +9,8 @@ namespace {
 
 std::string as_line(const rtc::Diagnostic& message) {
     std::string line;
-    if (!message.file.empty()) line = message.file + ":" + (message.line ? std::to_string(message.line) + ":" : "") + " ";
+    if (!message.file.empty())
+        line = message.file + ":" + (message.line ? std::to_string(message.line) + ":" : "") + " ";
     return line + (message.severity == rtc::Severity::Error ? "error: " : "warning: ") + message.text + "\n";
 }
 
@@ -17,7 +18,8 @@ void view_reflection(rtcc_result& result) {
     const rtc::Reflection& r = result.reflection;
     for (const rtc::StageReport& stage : r.stages)
         result.stage_infos.push_back({rtcc::stage_of(stage.kind), stage.name.c_str(), stage.file.c_str(),
-                                      stage.first_state, stage.states, stage.payload_words, stage.record_bytes});
+                                      stage.first_state, stage.states, stage.payload_words,
+                                      stage.record_bytes});
     for (const rtc::GroupReport& group : r.groups) {
         rtcc_group_info info = {};
         info.kind = static_cast<rtcc_group_kind>(group.kind);
@@ -29,17 +31,18 @@ void view_reflection(rtcc_result& result) {
         result.resource_infos.push_back({resource.name.c_str(), resource.stage.c_str(), resource.set,
                                          resource.binding, resource.type.c_str(), resource.array_size});
     for (const rtc::SpecConstantReport& constant : r.spec_constants)
-        result.spec_constant_infos.push_back({constant.stage.c_str(), constant.name.c_str(), constant.original_id,
-                                              constant.id, constant.type.c_str(), constant.default_value});
+        result.spec_constant_infos.push_back({constant.stage.c_str(), constant.name.c_str(),
+                                              constant.original_id, constant.id, constant.type.c_str(),
+                                              constant.default_value});
     for (const rtc::TraceSiteReport& site : r.trace_sites) {
         auto& names = result.variable_names.emplace_back();
         for (const std::string& name : site.variables) names.push_back(name.c_str());
     }
     for (size_t i = 0; i < r.trace_sites.size(); ++i) {
         const rtc::TraceSiteReport& site = r.trace_sites[i];
-        result.trace_site_infos.push_back({site.stage.c_str(), site.file.c_str(), site.line, site.callable ? 1 : 0,
-                                           site.frame_bytes, result.variable_names[i].size(),
-                                           result.variable_names[i].data()});
+        result.trace_site_infos.push_back({site.stage.c_str(), site.file.c_str(), site.line,
+                                           site.callable ? 1 : 0, site.frame_bytes,
+                                           result.variable_names[i].size(), result.variable_names[i].data()});
     }
     for (const std::string& feature : r.required_features) result.feature_names.push_back(feature.c_str());
 
@@ -76,8 +79,9 @@ void view_reflection(rtcc_result& result) {
 }
 
 size_t count_of(const rtcc_result& result, rtc::Severity severity) {
-    return static_cast<size_t>(std::count_if(result.diagnostics.begin(), result.diagnostics.end(),
-                                             [&](const rtc::Diagnostic& d) { return d.severity == severity; }));
+    return static_cast<size_t>(
+        std::count_if(result.diagnostics.begin(), result.diagnostics.end(),
+                      [&](const rtc::Diagnostic& d) { return d.severity == severity; }));
 }
 
 }  // namespace
@@ -87,7 +91,8 @@ void rtcc_result::publish(rtcc_status wanted, const rtcc_options& options) {
     if (status == RTCC_STATUS_INVALID_ARGUMENT && diagnostics.empty())
         error("invalid-argument", "", 0, "invalid argument");
     if (options.suppress_warnings)
-        std::erase_if(diagnostics, [](const rtc::Diagnostic& d) { return d.severity == rtc::Severity::Warning; });
+        std::erase_if(diagnostics,
+                      [](const rtc::Diagnostic& d) { return d.severity == rtc::Severity::Warning; });
     if (options.warnings_as_errors)
         for (rtc::Diagnostic& message : diagnostics)
             if (message.severity == rtc::Severity::Warning) {
@@ -134,7 +139,9 @@ const char* rtcc_result_assembly(rtcc_result_t result) {
     }
 }
 
-size_t rtcc_result_diagnostic_count(rtcc_const_result_t result) { return result ? result->diagnostics.size() : 0; }
+size_t rtcc_result_diagnostic_count(rtcc_const_result_t result) {
+    return result ? result->diagnostics.size() : 0;
+}
 
 rtcc_diagnostic rtcc_result_diagnostic(rtcc_const_result_t result, size_t index) {
     if (!result || index >= result->diagnostics.size()) return {RTCC_SEVERITY_WARNING, "", "", 0, ""};
@@ -143,7 +150,9 @@ rtcc_diagnostic rtcc_result_diagnostic(rtcc_const_result_t result, size_t index)
             message.id.c_str(), message.file.c_str(), message.line, message.text.c_str()};
 }
 
-const char* rtcc_result_messages(rtcc_const_result_t result) { return result ? result->messages.c_str() : ""; }
+const char* rtcc_result_messages(rtcc_const_result_t result) {
+    return result ? result->messages.c_str() : "";
+}
 
 size_t rtcc_result_warning_count(rtcc_const_result_t result) {
     return result ? count_of(*result, rtc::Severity::Warning) : 0;
@@ -153,7 +162,9 @@ size_t rtcc_result_error_count(rtcc_const_result_t result) {
     return result ? count_of(*result, rtc::Severity::Error) : 0;
 }
 
-size_t rtcc_result_dependency_count(rtcc_const_result_t result) { return result ? result->dependencies.size() : 0; }
+size_t rtcc_result_dependency_count(rtcc_const_result_t result) {
+    return result ? result->dependencies.size() : 0;
+}
 
 const char* rtcc_result_dependency(rtcc_const_result_t result, size_t index) {
     return result && index < result->dependencies.size() ? result->dependencies[index].c_str() : nullptr;

@@ -22,7 +22,8 @@ constexpr std::array kSpellings = {
     Spelling{"gl_hitTEXT", "write gl_HitTEXT"},
     Spelling{"gl_LaunchIDNVX", "write gl_LaunchIDNV"},
     Spelling{"gl_LaunchSizeNVX", "write gl_LaunchSizeNV"},
-    Spelling{"gl_GeometryIndexNV", "GL_NV_ray_tracing has no geometry index; GL_EXT_ray_tracing has gl_GeometryIndexEXT"},
+    Spelling{"gl_GeometryIndexNV",
+             "GL_NV_ray_tracing has no geometry index; GL_EXT_ray_tracing has gl_GeometryIndexEXT"},
     Spelling{"gl_ObjectToWorld3x4NV", "GL_NV_ray_tracing has gl_ObjectToWorldNV only; transpose it"},
     Spelling{"gl_WorldToObject3x4NV", "GL_NV_ray_tracing has gl_WorldToObjectNV only; transpose it"},
     Spelling{"accelerationStructureNVX", "write accelerationStructureNV"},
@@ -47,7 +48,9 @@ bool has_word(std::string_view text, std::string_view word) {
     return false;
 }
 
-bool contains(std::string_view text, std::string_view part) { return text.find(part) != std::string_view::npos; }
+bool contains(std::string_view text, std::string_view part) {
+    return text.find(part) != std::string_view::npos;
+}
 
 std::vector<std::string> lines_of(const std::string& text) {
     std::vector<std::string> lines(1);
@@ -90,10 +93,11 @@ std::string advice_for(const Diagnostic& message, std::string_view line_text,
         return "this glslang (" + glslang_version() + ") does not know it; give the stage as SPIR-V instead";
     // Both misspellings fail as tokens here, or inside an unknown call on the same line.
     for (const Spelling& spelling : kSpellings)
-        if (token == spelling.old_name || (token.empty() && contains(text, "syntax error") &&
-                                           has_word(line_text, spelling.old_name)))
+        if (token == spelling.old_name ||
+            (token.empty() && contains(text, "syntax error") && has_word(line_text, spelling.old_name)))
             return std::string(spelling.advice);
-    if (contains(text, "can only be used in uniform variables") || contains(text, "requires uniform or buffer storage"))
+    if (contains(text, "can only be used in uniform variables") ||
+        contains(text, "requires uniform or buffer storage"))
         return "write `uniform` before the type";
     if (contains(text, "without a format layout qualifier"))
         return "give the image a format (layout(rgba8, …)) or declare it writeonly";
@@ -116,8 +120,9 @@ void add_spellings(const std::string& file, const std::vector<std::string>& code
     for (uint32_t line = after + 1; line <= code.size(); ++line)
         for (const Spelling& spelling : kSpellings)
             if (has_word(code[line - 1], spelling.old_name))
-                diagnostics.push_back({Severity::Error, "glsl-old-spelling", file, line,
-                                       "'" + std::string(spelling.old_name) + "' : " + std::string(spelling.advice)});
+                diagnostics.push_back(
+                    {Severity::Error, "glsl-old-spelling", file, line,
+                     "'" + std::string(spelling.old_name) + "' : " + std::string(spelling.advice)});
 }
 
 }  // namespace
@@ -131,7 +136,8 @@ void add_advice(const std::string& file, const std::string& source, std::vector<
     for (Diagnostic& message : diagnostics) {
         if (message.severity != Severity::Error) continue;
         const bool here = message.file == file && message.line >= 1 && message.line <= code.size();
-        const std::string advice = advice_for(message, here ? std::string_view(code[message.line - 1]) : "", code);
+        const std::string advice =
+            advice_for(message, here ? std::string_view(code[message.line - 1]) : "", code);
         if (contains(message.text, "GL_EXT_ray_tracing_position_fetch")) message.id = "position-fetch-glsl";
         if (!advice.empty()) message.text += "; " + advice;
     }

@@ -40,9 +40,9 @@ using IncludeCallback = std::function<IncludeAnswer(const IncludeRequest&)>;
 struct FrontendOptions {
     std::vector<Macro> macros;
     std::vector<std::string> include_directories;
-    IncludeCallback include;  // when empty: the file system
-    std::string glsl_version; // "460", "460core": overrides #version (-std=)
-    bool debug_info = true;   // OpLine, OpSource with text
+    IncludeCallback include;   // when empty: the file system
+    std::string glsl_version;  // "460", "460core": overrides #version (-std=)
+    bool debug_info = true;    // OpLine, OpSource with text
 };
 
 struct GlslSource {

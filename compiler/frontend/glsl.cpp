@@ -1,6 +1,6 @@
-#include <glslang/SPIRV/GlslangToSpv.h>
 #include <glslang/Public/ResourceLimits.h>
 #include <glslang/Public/ShaderLang.h>
+#include <glslang/SPIRV/GlslangToSpv.h>
 
 #include <charconv>
 #include <mutex>
@@ -27,17 +27,24 @@ void initialize_glslang() {
 
 EShLanguage glslang_stage(StageKind kind) {
     switch (kind) {
-        case StageKind::RayGen: return EShLangRayGen;
-        case StageKind::Intersection: return EShLangIntersect;
-        case StageKind::AnyHit: return EShLangAnyHit;
-        case StageKind::ClosestHit: return EShLangClosestHit;
-        case StageKind::Miss: return EShLangMiss;
-        case StageKind::Callable: return EShLangCallable;
+        case StageKind::RayGen:
+            return EShLangRayGen;
+        case StageKind::Intersection:
+            return EShLangIntersect;
+        case StageKind::AnyHit:
+            return EShLangAnyHit;
+        case StageKind::ClosestHit:
+            return EShLangClosestHit;
+        case StageKind::Miss:
+            return EShLangMiss;
+        case StageKind::Callable:
+            return EShLangCallable;
     }
     return EShLangRayGen;
 }
 
-void report(FrontendResult& result, const char* id, const std::string& file, uint32_t line, std::string text) {
+void report(FrontendResult& result, const char* id, const std::string& file, uint32_t line,
+            std::string text) {
     result.diagnostics.push_back({Severity::Error, id, file, line, std::move(text)});
 }
 
@@ -46,8 +53,8 @@ std::string preamble_for(const FrontendOptions& options, const std::string& assu
     std::string preamble = "#extension GL_GOOGLE_include_directive : enable\n";
     if (!assumed.empty()) preamble += "#extension " + assumed + " : enable\n";
     for (const Macro& macro : options.macros)
-        preamble += macro.value ? "#define " + macro.name + " " + *macro.value + "\n"
-                                : "#undef " + macro.name + "\n";
+        preamble +=
+            macro.value ? "#define " + macro.name + " " + *macro.value + "\n" : "#undef " + macro.name + "\n";
     return preamble;
 }
 
@@ -77,15 +84,15 @@ bool chosen_version(const GlslSource& source, const SourceFacts& facts, const Fr
     uint32_t line = facts.version_line;
     if (!options.glsl_version.empty()) {
         if (!parse_glsl_version(options.glsl_version, number, profile)) {
-            report(result, "std-unknown", source.file, 0, "invalid GLSL version '" + options.glsl_version + "'");
+            report(result, "std-unknown", source.file, 0,
+                   "invalid GLSL version '" + options.glsl_version + "'");
             return false;
         }
         version.forced = true;
         line = 0;
     }
     if (number == 0) {
-        report(result, "version-missing", source.file, 1,
-               "no #version; begin the shader with #version 460");
+        report(result, "version-missing", source.file, 1, "no #version; begin the shader with #version 460");
         return false;
     }
     if (number < 460 || (!profile.empty() && profile != "core")) {
@@ -112,8 +119,10 @@ void set_environment(glslang::TShader& shader, EShLanguage stage, Environment en
 // Keeps the pointers that TShader::setStrings… stores alive as long as the shader.
 struct ShaderText {
     ShaderText(const GlslSource& source, const FrontendOptions& options, const std::string& assumed = {})
-        : preamble(preamble_for(options, assumed)), text(source.text.c_str()),
-          length(static_cast<int>(source.text.size())), name(source.file.c_str()) {}
+        : preamble(preamble_for(options, assumed)),
+          text(source.text.c_str()),
+          length(static_cast<int>(source.text.size())),
+          name(source.file.c_str()) {}
     void give_to(glslang::TShader& shader) {
         shader.setStringsWithLengthsAndNames(&text, &length, &name, 1);
         shader.setPreamble(preamble.c_str());
@@ -134,8 +143,8 @@ struct Attempt {
     bool wants_ext = false;  // an include, or glslang, says that this needs the EXT environment
 };
 
-bool preprocess(const GlslSource& source, const SourceFacts& facts, const FrontendOptions& options, StageKind kind,
-                Environment environment, FrontendResult& result, bool& wants_ext) {
+bool preprocess(const GlslSource& source, const SourceFacts& facts, const FrontendOptions& options,
+                StageKind kind, Environment environment, FrontendResult& result, bool& wants_ext) {
     initialize_glslang();
     Version version;
     chosen_version(source, facts, options, version, result);
@@ -146,16 +155,16 @@ bool preprocess(const GlslSource& source, const SourceFacts& facts, const Fronte
     text.give_to(shader);
     set_environment(shader, stage, environment);
     const auto messages = static_cast<EShMessages>(kMessages | EShMsgOnlyPreprocessor);
-    const bool ok = shader.preprocess(&limits(), version.number, version.profile, version.forced, false, messages,
-                                      &result.text, includer);
+    const bool ok = shader.preprocess(&limits(), version.number, version.profile, version.forced, false,
+                                      messages, &result.text, includer);
     parse_glslang_log(shader.getInfoLog(), source.file, result.diagnostics);
     remember_dependencies(source, includer, result);
     wants_ext = includer.names_ext();
     return ok && !has_errors(result.diagnostics);
 }
 
-Attempt compile(const GlslSource& source, const SourceFacts& facts, const FrontendOptions& options, StageKind kind,
-                Environment environment, const std::string& assumed = {}) {
+Attempt compile(const GlslSource& source, const SourceFacts& facts, const FrontendOptions& options,
+                StageKind kind, Environment environment, const std::string& assumed = {}) {
     initialize_glslang();
     Attempt attempt;
     FrontendResult& result = attempt.result;
@@ -164,7 +173,8 @@ Attempt compile(const GlslSource& source, const SourceFacts& facts, const Fronte
     const bool version_ok = chosen_version(source, facts, options, version, result);
 
     if (!assumed.empty())
-        report(result, "extension-missing", source.file, 1, "no #extension; write #extension " + assumed + " : require");
+        report(result, "extension-missing", source.file, 1,
+               "no #extension; write #extension " + assumed + " : require");
 
     const EShLanguage stage = glslang_stage(kind);
     ShaderText text(source, options, assumed);
@@ -175,8 +185,8 @@ Attempt compile(const GlslSource& source, const SourceFacts& facts, const Fronte
     set_environment(shader, stage, environment);
     auto messages = kMessages;
     if (options.debug_info) messages = static_cast<EShMessages>(messages | EShMsgDebugInfo);
-    const bool parsed = shader.parse(&limits(), version.number, version.profile, version.forced, false, messages,
-                                     includer);
+    const bool parsed =
+        shader.parse(&limits(), version.number, version.profile, version.forced, false, messages, includer);
     parse_glslang_log(shader.getInfoLog(), source.file, result.diagnostics);
     remember_dependencies(source, includer, result);
     attempt.wants_ext = includer.names_ext();
@@ -189,7 +199,8 @@ Attempt compile(const GlslSource& source, const SourceFacts& facts, const Fronte
     }
     if (!parsed || !linked || !version_ok || !assumed.empty()) {
         for (const Diagnostic& message : result.diagnostics)
-            attempt.wants_ext |= message.text.find("not supported for current targeted SPIR-V") != std::string::npos;
+            attempt.wants_ext |=
+                message.text.find("not supported for current targeted SPIR-V") != std::string::npos;
         add_advice(source.file, source.text, result.diagnostics);
         if (!has_errors(result.diagnostics))
             report(result, "glsl-error", source.file, 0, "the GLSL front end failed without a message");
@@ -222,10 +233,11 @@ bool find_stage(const GlslSource& source, const SourceFacts& facts, StageKind& k
         }
         const auto named = stage_kind_from_name(first.name);
         if (!named) {
-            report(result, "shader-stage-unknown", source.file, first.line,
-                   "'#pragma shader_stage(" + first.name +
-                       ")' names no ray tracing stage: expected raygen, intersection, anyhit, closesthit, miss "
-                       "or callable");
+            report(
+                result, "shader-stage-unknown", source.file, first.line,
+                "'#pragma shader_stage(" + first.name +
+                    ")' names no ray tracing stage: expected raygen, intersection, anyhit, closesthit, miss "
+                    "or callable");
             return false;
         }
         kind = *named;
@@ -234,7 +246,8 @@ bool find_stage(const GlslSource& source, const SourceFacts& facts, StageKind& k
     const auto from_file = stage_kind_from_file(source.file);
     if (!from_file) {
         report(result, "shader-stage-unknown", source.file, 0,
-               "cannot tell the shader stage: no file extension .rgen, .rint, .rahit, .rchit, .rmiss or .rcall, no "
+               "cannot tell the shader stage: no file extension .rgen, .rint, .rahit, .rchit, .rmiss or "
+               ".rcall, no "
                "#pragma shader_stage, no -fshader-stage");
         return false;
     }
@@ -249,7 +262,8 @@ Environment find_environment(const GlslSource& source, const FrontendOptions& op
     if (!facts.names_nv) return Environment::Ext;
     FrontendResult preprocessed;
     bool ignored = false;
-    if (!preprocess(source, facts, options, kind, Environment::Ext, preprocessed, ignored)) return Environment::Ext;
+    if (!preprocess(source, facts, options, kind, Environment::Ext, preprocessed, ignored))
+        return Environment::Ext;
     return scan_source(preprocessed.text).names_ext ? Environment::Ext : Environment::Nv;
 }
 
@@ -257,7 +271,8 @@ Environment find_environment(const GlslSource& source, const FrontendOptions& op
 void drop_preamble(std::string& text) {
     const std::string_view line = "#extension GL_GOOGLE_include_directive : enable";
     const size_t at = text.find(line);
-    if (at == std::string::npos || text.substr(0, at).find_first_not_of(" \t\r\n") != std::string::npos) return;
+    if (at == std::string::npos || text.substr(0, at).find_first_not_of(" \t\r\n") != std::string::npos)
+        return;
     size_t end = at + line.size();
     if (end < text.size() && text[end] == '\n') ++end;
     text.erase(0, end);
@@ -301,7 +316,8 @@ bool parse_glsl_version(std::string_view text, int& version, std::string& profil
     const auto parsed = std::from_chars(text.data(), text.data() + text.size(), version);
     if (parsed.ec != std::errc()) return false;
     profile = std::string(parsed.ptr, text.data() + text.size());
-    constexpr int known[] = {100, 110, 120, 130, 140, 150, 300, 310, 320, 330, 400, 410, 420, 430, 440, 450, 460};
+    constexpr int known[] = {100, 110, 120, 130, 140, 150, 300, 310, 320,
+                             330, 400, 410, 420, 430, 440, 450, 460};
     bool found = false;
     for (int number : known) found |= number == version;
     return found && (profile.empty() || profile == "core" || profile == "compatibility" || profile == "es");
@@ -350,7 +366,8 @@ FrontendResult preprocess_glsl(const GlslSource& source, const FrontendOptions& 
     }
     bool wants_ext = false;
     const bool ext = facts.names_ext;
-    result.ok = preprocess(source, facts, options, kind, ext ? Environment::Ext : Environment::Nv, result, wants_ext);
+    result.ok =
+        preprocess(source, facts, options, kind, ext ? Environment::Ext : Environment::Nv, result, wants_ext);
     if (!ext && wants_ext) {
         result = {};
         result.ok = preprocess(source, facts, options, kind, Environment::Ext, result, wants_ext);

@@ -60,18 +60,21 @@ SourceIncluder::IncludeResult* SourceIncluder::answer(const IncludeRequest& requ
                                    : find_on_disk(request, options_.include_directories);
     if (!answer->ok) answer->name.clear();
     if (answer->ok) {
-        if (std::find(files_.begin(), files_.end(), answer->name) == files_.end()) files_.push_back(answer->name);
+        if (std::find(files_.begin(), files_.end(), answer->name) == files_.end())
+            files_.push_back(answer->name);
         names_ext_ |= scan_source(answer->text).names_ext;
     }
     return new IncludeResult(answer->name, answer->text.data(), answer->text.size(), answer);
 }
 
 // One search does both kinds: the local one falls through to the -I folders itself.
-SourceIncluder::IncludeResult* SourceIncluder::includeSystem(const char* name, const char* includer, size_t depth) {
+SourceIncluder::IncludeResult* SourceIncluder::includeSystem(const char* name, const char* includer,
+                                                             size_t depth) {
     return answer({name, includer ? includer : "", false, depth});
 }
 
-SourceIncluder::IncludeResult* SourceIncluder::includeLocal(const char* name, const char* includer, size_t depth) {
+SourceIncluder::IncludeResult* SourceIncluder::includeLocal(const char* name, const char* includer,
+                                                            size_t depth) {
     return answer({name, includer ? includer : "", true, depth});
 }
 

@@ -11,7 +11,9 @@ bool starts_with(std::string_view text, std::string_view prefix) {
     return text.substr(0, prefix.size()) == prefix;
 }
 
-bool contains(std::string_view text, std::string_view part) { return text.find(part) != std::string_view::npos; }
+bool contains(std::string_view text, std::string_view part) {
+    return text.find(part) != std::string_view::npos;
+}
 
 std::string_view trimmed(std::string_view text) {
     while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back()))) text.remove_suffix(1);
@@ -37,8 +39,8 @@ bool split_position(std::string_view text, std::string& file, uint32_t& line, st
 }
 
 bool is_summary(std::string_view text) {
-    return contains(text, "compilation errors.  No code generated") || contains(text, ": compilation terminated") ||
-           contains(text, "SPIR-V is not generated");
+    return contains(text, "compilation errors.  No code generated") ||
+           contains(text, ": compilation terminated") || contains(text, "SPIR-V is not generated");
 }
 
 // After an unknown name glslang goes on with a float in its place; what it then
@@ -111,10 +113,9 @@ void parse_glslang_log(std::string_view log, const std::string& file, std::vecto
     }
     // "Missing entry point" after a syntax error is only its echo.
     if (out.size() - first > 1) {
-        const bool other_error =
-            std::any_of(out.begin() + first, out.end(), [](const Diagnostic& d) {
-                return d.severity == Severity::Error && d.text.find("Missing entry point") == std::string::npos;
-            });
+        const bool other_error = std::any_of(out.begin() + first, out.end(), [](const Diagnostic& d) {
+            return d.severity == Severity::Error && d.text.find("Missing entry point") == std::string::npos;
+        });
         if (other_error)
             std::erase_if(out, [](const Diagnostic& d) {
                 return d.text.find("Missing entry point") != std::string::npos;

@@ -63,7 +63,8 @@ class Words {
         rest_.remove_prefix(i);
         if (rest_.empty()) return {};
         size_t n = 0;
-        while (n < rest_.size() && (std::isalnum(static_cast<unsigned char>(rest_[n])) || rest_[n] == '_')) ++n;
+        while (n < rest_.size() && (std::isalnum(static_cast<unsigned char>(rest_[n])) || rest_[n] == '_'))
+            ++n;
         if (n == 0) n = 1;
         const std::string_view word = rest_.substr(0, n);
         rest_.remove_prefix(n);

@@ -12,13 +12,20 @@ namespace {
 
 std::optional<StageKind> kind_of_model(uint32_t model) {
     switch (static_cast<spv::ExecutionModel>(model)) {
-        case spv::ExecutionModel::RayGenerationKHR: return StageKind::RayGen;
-        case spv::ExecutionModel::IntersectionKHR: return StageKind::Intersection;
-        case spv::ExecutionModel::AnyHitKHR: return StageKind::AnyHit;
-        case spv::ExecutionModel::ClosestHitKHR: return StageKind::ClosestHit;
-        case spv::ExecutionModel::MissKHR: return StageKind::Miss;
-        case spv::ExecutionModel::CallableKHR: return StageKind::Callable;
-        default: return std::nullopt;
+        case spv::ExecutionModel::RayGenerationKHR:
+            return StageKind::RayGen;
+        case spv::ExecutionModel::IntersectionKHR:
+            return StageKind::Intersection;
+        case spv::ExecutionModel::AnyHitKHR:
+            return StageKind::AnyHit;
+        case spv::ExecutionModel::ClosestHitKHR:
+            return StageKind::ClosestHit;
+        case spv::ExecutionModel::MissKHR:
+            return StageKind::Miss;
+        case spv::ExecutionModel::CallableKHR:
+            return StageKind::Callable;
+        default:
+            return std::nullopt;
     }
 }
 
@@ -131,9 +138,12 @@ bool spec_value_from_text(const SpecConstantInfo& constant, std::string_view tex
     };
     if (value.empty()) return fail("value");
     if (constant.type == Type::Bool) {
-        if (value == "true" || value == "1") bits = 1;
-        else if (value == "false" || value == "0") bits = 0;
-        else return fail("bool: true, false, 1 or 0");
+        if (value == "true" || value == "1")
+            bits = 1;
+        else if (value == "false" || value == "0")
+            bits = 0;
+        else
+            return fail("bool: true, false, 1 or 0");
         return true;
     }
     if (constant.type == Type::Float) {
@@ -148,9 +158,12 @@ bool spec_value_from_text(const SpecConstantInfo& constant, std::string_view tex
         const char* const end = number.data() + number.size();
         const auto parsed = constant.width == 64 ? std::from_chars(number.data(), end, wide)
                                                  : std::from_chars(number.data(), end, narrow);
-        if (number.empty() || parsed.ec != std::errc() || parsed.ptr != end) return fail("floating-point number");
-        if (constant.width == 64) bits = std::bit_cast<uint64_t>(wide);
-        else if (constant.width == 32) bits = std::bit_cast<uint32_t>(narrow);
+        if (number.empty() || parsed.ec != std::errc() || parsed.ptr != end)
+            return fail("floating-point number");
+        if (constant.width == 64)
+            bits = std::bit_cast<uint64_t>(wide);
+        else if (constant.width == 32)
+            bits = std::bit_cast<uint32_t>(narrow);
         else {
             error = "16-bit float specialisation constants take their bit pattern through the C library only";
             return false;
@@ -174,8 +187,8 @@ bool spec_value_from_text(const SpecConstantInfo& constant, std::string_view tex
     const uint64_t largest_negative = width >= 64 ? 1ull << 63 : 1ull << (width - 1);
     if (negative ? (magnitude > largest_negative || (constant.type == Type::Uint && magnitude != 0))
                  : (magnitude & ~mask) != 0) {
-        error = "'" + value + "' does not fit specialisation constant " + std::to_string(constant.spec_id) + " of " +
-                std::to_string(width) + " bits";
+        error = "'" + value + "' does not fit specialisation constant " + std::to_string(constant.spec_id) +
+                " of " + std::to_string(width) + " bits";
         return false;
     }
     bits = (negative ? 0 - magnitude : magnitude) & mask;

@@ -53,7 +53,8 @@ bool decode(std::string_view text, std::vector<uint8_t>& bytes) {
             if (value < 0) return false;
             group = group << 6 | static_cast<uint32_t>(value);
         }
-        for (int k = 0; k < 3 - padding; ++k) bytes.push_back(static_cast<uint8_t>(group >> (16 - 8 * k) & 0xff));
+        for (int k = 0; k < 3 - padding; ++k)
+            bytes.push_back(static_cast<uint8_t>(group >> (16 - 8 * k) & 0xff));
     }
     return true;
 }
@@ -98,8 +99,10 @@ bool is_before_names(spv::Op op) {
         case spv::Op::OpString:
         case spv::Op::OpSourceExtension:
         case spv::Op::OpSource:
-        case spv::Op::OpSourceContinued: return true;
-        default: return false;
+        case spv::Op::OpSourceContinued:
+            return true;
+        default:
+            return false;
     }
 }
 
@@ -157,7 +160,8 @@ bool join_chunks(const std::vector<uint32_t>& spirv, std::vector<uint8_t>& bytes
         return false;
     }
     if (chunks.empty()) {
-        error = "the module carries no rtc reflection (made by another compiler, or its strings were stripped)";
+        error =
+            "the module carries no rtc reflection (made by another compiler, or its strings were stripped)";
         return false;
     }
     const size_t count = chunks[0].count;
@@ -170,7 +174,8 @@ bool join_chunks(const std::vector<uint32_t>& spirv, std::vector<uint8_t>& bytes
     return whole;
 }
 
-bool split_blob(const std::vector<uint8_t>& bytes, RtcModuleHeader& header, std::string& json, std::string& error) {
+bool split_blob(const std::vector<uint8_t>& bytes, RtcModuleHeader& header, std::string& json,
+                std::string& error) {
     if (bytes.size() >= sizeof header) std::memcpy(&header, bytes.data(), sizeof header);
     if (bytes.size() < sizeof header || header.magic != RTC_MODULE_MAGIC) {
         error = "damaged reflection: no header";
@@ -216,12 +221,13 @@ void embed_reflection(std::vector<uint32_t>& spirv, const Reflection& reflection
     for (size_t index = 0; index < count; ++index) {
         const size_t begin = index * kChunkBytes;
         const size_t size = std::min(kChunkBytes, blob.size() - begin);
-        const std::string text = std::string(kPrefix) + std::to_string(index) + "/" + std::to_string(count) + ":" +
-                                 encode(blob.data() + begin, size);
+        const std::string text = std::string(kPrefix) + std::to_string(index) + "/" + std::to_string(count) +
+                                 ":" + encode(blob.data() + begin, size);
         std::vector<uint32_t> literal(text.size() / 4 + 1, 0);
         for (size_t i = 0; i < text.size(); ++i)
             literal[i / 4] |= static_cast<uint32_t>(static_cast<uint8_t>(text[i])) << (8 * (i % 4));
-        strings.push_back(static_cast<uint32_t>(literal.size() + 2) << 16 | static_cast<uint32_t>(spv::Op::OpString));
+        strings.push_back(static_cast<uint32_t>(literal.size() + 2) << 16 |
+                          static_cast<uint32_t>(spv::Op::OpString));
         strings.push_back(bound++);
         strings.insert(strings.end(), literal.begin(), literal.end());
     }

@@ -22,10 +22,14 @@ struct Named {
 };
 
 constexpr std::array kBindings = {
-    Named{"params", RTC_BINDING_PARAMS},         Named{"heapTexels", RTC_BINDING_HEAP_TEXELS},
-    Named{"heap", RTC_BINDING_HEAP},             Named{"sbtRaygen", RTC_BINDING_SBT_RAYGEN},
-    Named{"sbtMiss", RTC_BINDING_SBT_MISS},      Named{"sbtHit", RTC_BINDING_SBT_HIT},
-    Named{"sbtCallable", RTC_BINDING_SBT_CALLABLE}, Named{"control", RTC_BINDING_CONTROL},
+    Named{"params", RTC_BINDING_PARAMS},
+    Named{"heapTexels", RTC_BINDING_HEAP_TEXELS},
+    Named{"heap", RTC_BINDING_HEAP},
+    Named{"sbtRaygen", RTC_BINDING_SBT_RAYGEN},
+    Named{"sbtMiss", RTC_BINDING_SBT_MISS},
+    Named{"sbtHit", RTC_BINDING_SBT_HIT},
+    Named{"sbtCallable", RTC_BINDING_SBT_CALLABLE},
+    Named{"control", RTC_BINDING_CONTROL},
     Named{"scratch", RTC_BINDING_SCRATCH},
 };
 static_assert(kBindings.size() == RTC_BINDING_COUNT);
@@ -182,7 +186,8 @@ Reflection from_json(const Json& json) {
         item.at("name").get_to(group.name);
         group.kind = static_cast<GroupKind>(index_of(kGroupNames, item.at("kind").get<std::string>()));
         const Json& handle = item.at("handle");
-        for (size_t i = 0; i < RTC_HANDLE_WORDS; ++i) group.handle[i] = static_cast<uint32_t>(from_hex(handle.at(i)));
+        for (size_t i = 0; i < RTC_HANDLE_WORDS; ++i)
+            group.handle[i] = static_cast<uint32_t>(from_hex(handle.at(i)));
     }
     for (const Json& item : json.at("resources")) {
         ResourceReport& resource = r.resources.emplace_back();

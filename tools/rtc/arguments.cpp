@@ -11,7 +11,8 @@ namespace {
 std::optional<uint32_t> number(std::string_view text) {
     uint32_t value = 0;
     const auto parsed = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (text.empty() || parsed.ec != std::errc() || parsed.ptr != text.data() + text.size()) return std::nullopt;
+    if (text.empty() || parsed.ec != std::errc() || parsed.ptr != text.data() + text.size())
+        return std::nullopt;
     return value;
 }
 
@@ -28,7 +29,8 @@ uint32_t number_between(std::string_view option, std::string_view value, uint32_
     const auto parsed = number(value);
     if (!parsed || *parsed < low || *parsed > high)
         throw UsageError("invalid value '" + std::string(value) + "' in '" + std::string(option) + "=" +
-                         std::string(value) + "': expected " + std::to_string(low) + " to " + std::to_string(high));
+                         std::string(value) + "': expected " + std::to_string(low) + " to " +
+                         std::to_string(high));
     return *parsed;
 }
 
@@ -40,9 +42,12 @@ class Parser {
         bool options = true;
         for (at_ = 0; at_ < words_.size(); ++at_) {
             const std::string& word = words_[at_];
-            if (options && word == "--") options = false;
-            else if (options && word.size() > 1 && word[0] == '-') option(word);
-            else add_file(word);
+            if (options && word == "--")
+                options = false;
+            else if (options && word.size() > 1 && word[0] == '-')
+                option(word);
+            else
+                add_file(word);
         }
         check();
         return std::move(out_);
@@ -56,22 +61,36 @@ class Parser {
     }
 
     bool flag(std::string_view word) {
-        if (word == "-c") mode(Mode::CompileOnly);
-        else if (word == "-E") mode(Mode::Preprocess);
-        else if (word == "-M" || word == "-MM") mode(Mode::Dependencies);
-        else if (word == "-S") out_.assembly = true;
-        else if (word == "-MD") out_.dependency_file = true;
-        else if (word == "-MF") out_.dependency_output = next("-MF");
-        else if (word == "-MT") out_.dependency_target = next("-MT");
+        if (word == "-c")
+            mode(Mode::CompileOnly);
+        else if (word == "-E")
+            mode(Mode::Preprocess);
+        else if (word == "-M" || word == "-MM")
+            mode(Mode::Dependencies);
+        else if (word == "-S")
+            out_.assembly = true;
+        else if (word == "-MD")
+            out_.dependency_file = true;
+        else if (word == "-MF")
+            out_.dependency_output = next("-MF");
+        else if (word == "-MT")
+            out_.dependency_target = next("-MT");
         else if (word == "-O" || word == "-O1" || word == "-O2" || word == "-O3")
             out_.optimization = RTCC_OPTIMIZATION_PERFORMANCE;
-        else if (word == "-O0") out_.optimization = RTCC_OPTIMIZATION_NONE;
-        else if (word == "-Os") out_.optimization = RTCC_OPTIMIZATION_SIZE;
-        else if (word == "-g") out_.debug_info = true;
-        else if (word == "-w") out_.suppress_warnings = true;
-        else if (word == "-Werror") out_.warnings_as_errors = true;
-        else if (word == "-h") out_.help = true;
-        else return false;
+        else if (word == "-O0")
+            out_.optimization = RTCC_OPTIMIZATION_NONE;
+        else if (word == "-Os")
+            out_.optimization = RTCC_OPTIMIZATION_SIZE;
+        else if (word == "-g")
+            out_.debug_info = true;
+        else if (word == "-w")
+            out_.suppress_warnings = true;
+        else if (word == "-Werror")
+            out_.warnings_as_errors = true;
+        else if (word == "-h")
+            out_.help = true;
+        else
+            return false;
         return true;
     }
 
@@ -88,15 +107,21 @@ class Parser {
             case 'D': {
                 const size_t equals = value.find('=');
                 if (value.empty() || equals == 0) throw UsageError("-D without a macro name: '" + word + "'");
-                out_.macros.push_back({value.substr(0, equals),
-                                       equals == std::string::npos ? std::string() : value.substr(equals + 1)});
+                out_.macros.push_back({value.substr(0, equals), equals == std::string::npos
+                                                                    ? std::string()
+                                                                    : value.substr(equals + 1)});
                 break;
             }
-            case 'U': out_.macros.push_back({value, std::nullopt}); break;
-            case 'I': out_.include_directories.push_back(value); break;
+            case 'U':
+                out_.macros.push_back({value, std::nullopt});
+                break;
+            case 'I':
+                out_.include_directories.push_back(value);
+                break;
             case 'x':
                 if (value == "hlsl")
-                    throw UsageError("language 'hlsl': compile HLSL with DXC or Slang and give rtc the SPIR-V");
+                    throw UsageError(
+                        "language 'hlsl': compile HLSL with DXC or Slang and give rtc the SPIR-V");
                 if (value != "glsl" && value != "spirv" && value != "none")
                     throw UsageError("language not recognized: '" + value + "'");
                 break;
@@ -115,10 +140,14 @@ class Parser {
             rtcc_options_release(probe);
             if (value.empty() || status != RTCC_STATUS_SUCCESS) invalid_value(name, value);
         } else if (name == "-mfmt") {
-            if (value == "bin") out_.format = BinaryFormat::Bin;
-            else if (value == "c") out_.format = BinaryFormat::C;
-            else if (value == "num") out_.format = BinaryFormat::Num;
-            else invalid_value(name, value);
+            if (value == "bin")
+                out_.format = BinaryFormat::Bin;
+            else if (value == "c")
+                out_.format = BinaryFormat::C;
+            else if (value == "num")
+                out_.format = BinaryFormat::Num;
+            else
+                invalid_value(name, value);
         } else if (name == "-fentry-point") {
             if (value.empty()) invalid_value(name, value);
             entry_ = value;
@@ -135,13 +164,20 @@ class Parser {
         const size_t equals = word.find('=');
         const std::string name = word.substr(0, equals);
         if (equals == std::string::npos) {
-            if (name == "--help") out_.help = true;
-            else if (name == "--version") out_.version = true;
-            else if (name == "--report") out_.report = true;
-            else if (name == "--no-validate") out_.validate = false;
-            else if (name == "--no-resumable") out_.resumable = false;
-            else if (takes_value(name)) valued(name, next(name));
-            else throw UsageError("unknown argument: '" + word + "'");
+            if (name == "--help")
+                out_.help = true;
+            else if (name == "--version")
+                out_.version = true;
+            else if (name == "--report")
+                out_.report = true;
+            else if (name == "--no-validate")
+                out_.validate = false;
+            else if (name == "--no-resumable")
+                out_.resumable = false;
+            else if (takes_value(name))
+                valued(name, next(name));
+            else
+                throw UsageError("unknown argument: '" + word + "'");
             return;
         }
         if (!takes_value(name)) throw UsageError("unknown argument: '" + word + "'");
@@ -149,8 +185,9 @@ class Parser {
     }
 
     static bool takes_value(std::string_view name) {
-        for (std::string_view known : {"--hit-group", "--stage", "--pipeline", "--reflect", "--target-env",
-                                       "--max-recursion-depth", "--max-callable-depth", "--reserved", "--dump-after"})
+        for (std::string_view known :
+             {"--hit-group", "--stage", "--pipeline", "--reflect", "--target-env", "--max-recursion-depth",
+              "--max-callable-depth", "--reserved", "--dump-after"})
             if (name == known) return true;
         return false;
     }
@@ -176,11 +213,15 @@ class Parser {
             if (value.empty()) invalid_value(name, value);
             out_.reflect = value;
         } else if (name == "--target-env") {
-            if (value == "vulkan1.1") out_.target = RTCC_TARGET_VULKAN_1_1;
-            else if (value == "vulkan1.2") out_.target = RTCC_TARGET_VULKAN_1_2;
-            else if (value == "vulkan1.3") out_.target = RTCC_TARGET_VULKAN_1_3;
-            else throw UsageError("invalid value '" + value + "' in '--target-env=" + value +
-                                  "': expected vulkan1.1, vulkan1.2 or vulkan1.3");
+            if (value == "vulkan1.1")
+                out_.target = RTCC_TARGET_VULKAN_1_1;
+            else if (value == "vulkan1.2")
+                out_.target = RTCC_TARGET_VULKAN_1_2;
+            else if (value == "vulkan1.3")
+                out_.target = RTCC_TARGET_VULKAN_1_3;
+            else
+                throw UsageError("invalid value '" + value + "' in '--target-env=" + value +
+                                 "': expected vulkan1.1, vulkan1.2 or vulkan1.3");
         } else if (name == "--max-recursion-depth") {
             out_.recursion_depth = number_between(name, value, 1, 31);
         } else if (name == "--max-callable-depth") {
@@ -199,7 +240,8 @@ class Parser {
         const auto binding = dot == std::string::npos ? std::optional<uint32_t>(0)
                                                       : number(std::string_view(value).substr(dot + 1));
         if (!set || !binding || *set > 0x7fffffff)
-            throw UsageError("invalid value '" + value + "' in '--reserved=" + value + "': expected SET or SET.BINDING");
+            throw UsageError("invalid value '" + value + "' in '--reserved=" + value +
+                             "': expected SET or SET.BINDING");
         out_.reserved_set = static_cast<int32_t>(*set);
         out_.reserved_binding = *binding;
     }
@@ -231,21 +273,27 @@ class Parser {
         if (out_.help || out_.version) return;
         if (out_.inputs.empty()) throw UsageError("no input files");
         if (out_.format != BinaryFormat::Bin) {
-            const char* what = out_.format == BinaryFormat::C ? "a C-style initializer list" : "a list of numbers";
+            const char* what =
+                out_.format == BinaryFormat::C ? "a C-style initializer list" : "a list of numbers";
             if (out_.mode == Mode::Preprocess)
-                throw UsageError(std::string("cannot emit output as ") + what + " when only preprocessing the source");
+                throw UsageError(std::string("cannot emit output as ") + what +
+                                 " when only preprocessing the source");
             if (out_.mode == Mode::Dependencies)
-                throw UsageError(std::string("cannot emit output as ") + what + " when only listing dependencies");
+                throw UsageError(std::string("cannot emit output as ") + what +
+                                 " when only listing dependencies");
             if (out_.assembly)
                 throw UsageError(std::string("cannot emit output as ") + what + " when emitting assembly");
         }
         const bool any_dependencies = out_.dependency_file || out_.mode == Mode::Dependencies;
-        if (!any_dependencies && !out_.dependency_output.empty()) throw UsageError("'-MF' needs '-M' or '-MD'");
-        if (!any_dependencies && !out_.dependency_target.empty()) throw UsageError("'-MT' needs '-M' or '-MD'");
+        if (!any_dependencies && !out_.dependency_output.empty())
+            throw UsageError("'-MF' needs '-M' or '-MD'");
+        if (!any_dependencies && !out_.dependency_target.empty())
+            throw UsageError("'-MT' needs '-M' or '-MD'");
         if (out_.mode == Mode::CompileOnly && !out_.output.empty() && out_.inputs.size() > 1)
             throw UsageError("cannot specify -o when generating multiple output files");
         for (const InputArgument& input : out_.inputs)
-            if (out_.mode != Mode::Link && input.kind == InputArgument::Kind::Pipeline && out_.mode == Mode::CompileOnly)
+            if (out_.mode != Mode::Link && input.kind == InputArgument::Kind::Pipeline &&
+                out_.mode == Mode::CompileOnly)
                 throw UsageError("'-c' compiles files, not a --pipeline");
     }
 
@@ -263,14 +311,16 @@ InputArgument parse_stage_argument(const std::string& text) {
     const std::string form = "expected NAME=KIND:FILE[:ENTRY][,spec.ID=VALUE...]";
     const size_t equals = text.find('=');
     const size_t colon = text.find(':', equals == std::string::npos ? 0 : equals);
-    if (equals == std::string::npos || equals == 0 || colon == std::string::npos) throw UsageError(where + form);
+    if (equals == std::string::npos || equals == 0 || colon == std::string::npos)
+        throw UsageError(where + form);
     InputArgument stage;
     stage.kind = InputArgument::Kind::Stage;
     stage.name = text.substr(0, equals);
     const std::string kind = text.substr(equals + 1, colon - equals - 1);
     stage.stage = rtcc_stage_from_name(kind.c_str());
     if (stage.stage == RTCC_STAGE_AUTO)
-        throw UsageError(where + "'" + kind + "' is no stage: expected rgen, rint, rahit, rchit, rmiss or rcall");
+        throw UsageError(where + "'" + kind +
+                         "' is no stage: expected rgen, rint, rahit, rchit, rmiss or rcall");
 
     size_t comma = text.find(',', colon);
     stage.file = text.substr(colon + 1, comma == std::string::npos ? comma : comma - colon - 1);

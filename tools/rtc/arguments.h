@@ -18,10 +18,10 @@ struct SpecArgument {
 // One stage or group as the user named it, in command line order.
 struct InputArgument {
     enum class Kind { File, Stage, HitGroup, Pipeline } kind = Kind::File;
-    std::string name;                      // of a --stage or --hit-group
-    std::string file;                      // or the members' list of a --hit-group
-    rtcc_stage stage = RTCC_STAGE_AUTO;    // -fshader-stage= or --stage
-    std::optional<std::string> entry;      // -fentry-point= or --stage
+    std::string name;                    // of a --stage or --hit-group
+    std::string file;                    // or the members' list of a --hit-group
+    rtcc_stage stage = RTCC_STAGE_AUTO;  // -fshader-stage= or --stage
+    std::optional<std::string> entry;    // -fentry-point= or --stage
     std::vector<SpecArgument> specialization;
 };
 

@@ -20,8 +20,8 @@ std::string read_input(const std::string& path) {
     errno = 0;
     std::ifstream stream(path, std::ios::binary);
     if (!stream)
-        throw InputError("rtc: error: cannot open input file: '" + path + "': " +
-                         std::strerror(errno ? errno : ENOENT));
+        throw InputError("rtc: error: cannot open input file: '" + path +
+                         "': " + std::strerror(errno ? errno : ENOENT));
     return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
@@ -40,10 +40,12 @@ std::shared_ptr<const SourceFile> SourceFiles::open(const std::string& path) {
     const bool named_spirv = path.size() > 4 && path.compare(path.size() - 4, 4, ".spv") == 0;
     file->is_spirv = named_spirv || rtcc_is_spirv(file->bytes.data(), file->bytes.size());
     if (file->is_spirv) {
-        rtcc_result_t module = rtcc_module_from_bytes(file->name.c_str(), file->bytes.data(), file->bytes.size());
+        rtcc_result_t module =
+            rtcc_module_from_bytes(file->name.c_str(), file->bytes.data(), file->bytes.size());
         const bool ok = rtcc_result_status(module) == RTCC_STATUS_SUCCESS;
         if (ok)
-            file->words.assign(rtcc_result_words(module), rtcc_result_words(module) + rtcc_result_word_count(module));
+            file->words.assign(rtcc_result_words(module),
+                               rtcc_result_words(module) + rtcc_result_word_count(module));
         std::string message = rtcc_result_messages(module);
         rtcc_result_release(module);
         while (!message.empty() && message.back() == '\n') message.pop_back();

@@ -55,14 +55,19 @@ class Parser {
         JsonValue value;
         value.place = place_;
         const char c = peek();
-        if (c == '{') parse_object(value, depth);
-        else if (c == '[') parse_array(value, depth);
+        if (c == '{')
+            parse_object(value, depth);
+        else if (c == '[')
+            parse_array(value, depth);
         else if (c == '"') {
             value.kind = JsonValue::Kind::String;
             value.text = parse_string();
-        } else if (c == '-' || std::isdigit(static_cast<unsigned char>(c))) parse_number(value);
-        else if (std::isalpha(static_cast<unsigned char>(c))) parse_word(value);
-        else fail(at_ < text_.size() ? "expected a value" : "unexpected end of the file");
+        } else if (c == '-' || std::isdigit(static_cast<unsigned char>(c)))
+            parse_number(value);
+        else if (std::isalpha(static_cast<unsigned char>(c)))
+            parse_word(value);
+        else
+            fail(at_ < text_.size() ? "expected a value" : "unexpected end of the file");
         return value;
     }
 
@@ -132,9 +137,12 @@ class Parser {
     void parse_word(JsonValue& value) {
         const JsonPlace begin = place_;
         while (std::isalpha(static_cast<unsigned char>(peek()))) value.text += take();
-        if (value.text == "true" || value.text == "false") value.kind = JsonValue::Kind::Bool;
-        else if (value.text == "null") value.kind = JsonValue::Kind::Null;
-        else json_error(file_, begin, "expected a value, found '" + value.text + "'");
+        if (value.text == "true" || value.text == "false")
+            value.kind = JsonValue::Kind::Bool;
+        else if (value.text == "null")
+            value.kind = JsonValue::Kind::Null;
+        else
+            json_error(file_, begin, "expected a value, found '" + value.text + "'");
     }
 
     uint32_t hex4() {
@@ -184,12 +192,26 @@ class Parser {
             if (at_ >= text_.size()) fail("unexpected end of the file in a string");
             const char escape = take();
             switch (escape) {
-                case '"': case '\\': case '/': out += escape; break;
-                case 'b': out += '\b'; break;
-                case 'f': out += '\f'; break;
-                case 'n': out += '\n'; break;
-                case 'r': out += '\r'; break;
-                case 't': out += '\t'; break;
+                case '"':
+                case '\\':
+                case '/':
+                    out += escape;
+                    break;
+                case 'b':
+                    out += '\b';
+                    break;
+                case 'f':
+                    out += '\f';
+                    break;
+                case 'n':
+                    out += '\n';
+                    break;
+                case 'r':
+                    out += '\r';
+                    break;
+                case 't':
+                    out += '\t';
+                    break;
                 case 'u': {
                     uint32_t code = hex4();
                     if (code >= 0xd800 && code < 0xdc00 && text_.compare(at_, 2, "\\u") == 0) {
@@ -204,7 +226,8 @@ class Parser {
                     append_utf8(out, code);
                     break;
                 }
-                default: fail(std::string("unknown escape '\\") + escape + "'");
+                default:
+                    fail(std::string("unknown escape '\\") + escape + "'");
             }
         }
     }
@@ -219,21 +242,29 @@ class Parser {
 
 const char* json_kind_name(JsonValue::Kind kind) {
     switch (kind) {
-        case JsonValue::Kind::Null: return "null";
-        case JsonValue::Kind::Bool: return "a bool";
-        case JsonValue::Kind::Number: return "a number";
-        case JsonValue::Kind::String: return "a string";
-        case JsonValue::Kind::Array: return "an array";
-        case JsonValue::Kind::Object: return "an object";
+        case JsonValue::Kind::Null:
+            return "null";
+        case JsonValue::Kind::Bool:
+            return "a bool";
+        case JsonValue::Kind::Number:
+            return "a number";
+        case JsonValue::Kind::String:
+            return "a string";
+        case JsonValue::Kind::Array:
+            return "an array";
+        case JsonValue::Kind::Object:
+            return "an object";
     }
     return "";
 }
 
 void json_error(const std::string& file, JsonPlace place, const std::string& what) {
-    throw InputError(file + ":" + std::to_string(place.line) + ":" + std::to_string(place.column) + ": error: " +
-                     what);
+    throw InputError(file + ":" + std::to_string(place.line) + ":" + std::to_string(place.column) +
+                     ": error: " + what);
 }
 
-JsonValue parse_json(const std::string& text, const std::string& file) { return Parser(text, file).document(); }
+JsonValue parse_json(const std::string& text, const std::string& file) {
+    return Parser(text, file).document();
+}
 
 }  // namespace cli

@@ -50,11 +50,13 @@ Options make_options(const Arguments& arguments) {
     rtcc_options_set_target_env(o, arguments.target);
     if (arguments.recursion_depth) rtcc_options_set_max_recursion_depth(o, *arguments.recursion_depth);
     if (arguments.callable_depth) rtcc_options_set_max_callable_depth(o, *arguments.callable_depth);
-    if (arguments.reserved_set) rtcc_options_set_reserved(o, *arguments.reserved_set, arguments.reserved_binding);
+    if (arguments.reserved_set)
+        rtcc_options_set_reserved(o, *arguments.reserved_set, arguments.reserved_binding);
     rtcc_options_set_validate(o, arguments.validate);
     rtcc_options_set_resumable(o, arguments.resumable);
     // As glslc has it, -M implies -w: only what it finds matters.
-    rtcc_options_set_suppress_warnings(o, arguments.suppress_warnings || arguments.mode == Mode::Dependencies);
+    rtcc_options_set_suppress_warnings(o,
+                                       arguments.suppress_warnings || arguments.mode == Mode::Dependencies);
     rtcc_options_set_warnings_as_errors(o, arguments.warnings_as_errors);
     if (!arguments.dump_after.empty()) rtcc_options_set_stop_after(o, arguments.dump_after.c_str());
     return options;
@@ -72,10 +74,18 @@ class Program {
         } else {
             const Plan plan = make_plan(arguments_, files_);
             switch (arguments_.mode) {
-                case Mode::Link: ok = link(plan); break;
-                case Mode::CompileOnly: ok = compile_only(plan); break;
-                case Mode::Preprocess: ok = preprocess(plan); break;
-                case Mode::Dependencies: ok = list_dependencies(plan); break;
+                case Mode::Link:
+                    ok = link(plan);
+                    break;
+                case Mode::CompileOnly:
+                    ok = compile_only(plan);
+                    break;
+                case Mode::Preprocess:
+                    ok = preprocess(plan);
+                    break;
+                case Mode::Dependencies:
+                    ok = list_dependencies(plan);
+                    break;
             }
         }
         print_counts();
@@ -111,7 +121,8 @@ class Program {
     bool is_finished_module() {
         if (arguments_.inputs.size() != 1 || arguments_.mode != Mode::Link) return false;
         const InputArgument& input = arguments_.inputs.front();
-        if (input.kind != InputArgument::Kind::File || (arguments_.reflect.empty() && !arguments_.report)) return false;
+        if (input.kind != InputArgument::Kind::File || (arguments_.reflect.empty() && !arguments_.report))
+            return false;
         const auto source = files_.open(input.file);
         if (!source->is_spirv) return false;
         return rtcc_module_stage(source->words.data(), source->words.size(), nullptr) == RTCC_STAGE_AUTO &&
@@ -128,7 +139,8 @@ class Program {
     }
 
     void write_reflection(rtcc_result_t result, const std::string& module) {
-        if (!arguments_.reflect.empty()) write_output(arguments_.reflect, rtcc_result_reflection_json(result));
+        if (!arguments_.reflect.empty())
+            write_output(arguments_.reflect, rtcc_result_reflection_json(result));
         const rtcc_reflection* reflection = rtcc_result_reflection(result);
         if (arguments_.report && reflection) print(report_text(*reflection, module));
     }
@@ -139,15 +151,15 @@ class Program {
             const SourceFile& source = *stage.source;
             const int32_t index =
                 source.is_spirv
-                    ? rtcc_pipeline_add_spirv(pipeline.get(), stage.kind, stage.name.c_str(), source.name.c_str(),
-                                              source.words.data(), source.words.size(),
+                    ? rtcc_pipeline_add_spirv(pipeline.get(), stage.kind, stage.name.c_str(),
+                                              source.name.c_str(), source.words.data(), source.words.size(),
                                               stage.entry ? stage.entry->c_str() : nullptr)
-                    : rtcc_pipeline_add_glsl(pipeline.get(), stage.kind, stage.name.c_str(), source.name.c_str(),
-                                             source.bytes.data(), source.bytes.size());
+                    : rtcc_pipeline_add_glsl(pipeline.get(), stage.kind, stage.name.c_str(),
+                                             source.name.c_str(), source.bytes.data(), source.bytes.size());
             if (index < 0) throw InputError("rtc: error: cannot add stage '" + stage.name + "'");
             if (!source.is_spirv && stage.entry && *stage.entry != "main")
-                throw InputError("rtc: error: stage '" + stage.name + "': the entry point of GLSL is main, not '" +
-                                 *stage.entry + "'");
+                throw InputError("rtc: error: stage '" + stage.name +
+                                 "': the entry point of GLSL is main, not '" + *stage.entry + "'");
             for (const SpecArgument& spec : stage.specialization)
                 rtcc_pipeline_specialize_text(pipeline.get(), index, spec.id, spec.value.c_str());
         }
@@ -155,8 +167,8 @@ class Program {
             if (group.general)
                 rtcc_pipeline_add_general_group(pipeline.get(), group.name.c_str(), group.stages[0]);
             else
-                rtcc_pipeline_add_hit_group(pipeline.get(), group.name.c_str(), group.stages[0], group.stages[1],
-                                            group.stages[2]);
+                rtcc_pipeline_add_hit_group(pipeline.get(), group.name.c_str(), group.stages[0],
+                                            group.stages[1], group.stages[2]);
         }
         return pipeline;
     }
@@ -191,14 +203,16 @@ class Program {
         for (size_t i = 0; i < rtcc_result_dependency_count(result); ++i)
             files.push_back(rtcc_result_dependency(result, i));
         files.insert(files.end(), plan.description_files.begin(), plan.description_files.end());
-        write_output(arguments_.dependency_output.empty() ? output + ".d" : arguments_.dependency_output,
-                     make_rule(arguments_.dependency_target.empty() ? output : arguments_.dependency_target, files));
+        write_output(
+            arguments_.dependency_output.empty() ? output + ".d" : arguments_.dependency_output,
+            make_rule(arguments_.dependency_target.empty() ? output : arguments_.dependency_target, files));
     }
 
     // One stage through the front end alone; SPIR-V has been there before.
     const SourceFile& glsl_of(const PlannedStage& stage, const char* option) const {
         if (stage.source->is_spirv)
-            throw InputError("rtc: error: '" + stage.source->name + "' is SPIR-V, '" + option + "' takes GLSL");
+            throw InputError("rtc: error: '" + stage.source->name + "' is SPIR-V, '" + option +
+                             "' takes GLSL");
         return *stage.source;
     }
 
@@ -228,7 +242,8 @@ class Program {
         for (const PlannedStage& stage : plan.stages) {
             const SourceFile& source = glsl_of(stage, "-E");
             const Result result(rtcc_preprocess_stage(compiler_.get(), stage.kind, source.name.c_str(),
-                                                      source.bytes.data(), source.bytes.size(), options_.get()));
+                                                      source.bytes.data(), source.bytes.size(),
+                                                      options_.get()));
             all &= accept(result);
             text += rtcc_result_text(result.get());
         }
@@ -251,14 +266,16 @@ class Program {
                 continue;
             }
             const Result result(rtcc_preprocess_stage(compiler_.get(), stage.kind, source.name.c_str(),
-                                                      source.bytes.data(), source.bytes.size(), options_.get()));
+                                                      source.bytes.data(), source.bytes.size(),
+                                                      options_.get()));
             all &= accept(result);
             for (size_t i = 0; i < rtcc_result_dependency_count(result.get()); ++i)
                 add(rtcc_result_dependency(result.get(), i));
         }
         for (const std::string& file : plan.description_files) add(file);
         if (!all) return false;
-        const std::string target = arguments_.dependency_target.empty() ? default_output() : arguments_.dependency_target;
+        const std::string target =
+            arguments_.dependency_target.empty() ? default_output() : arguments_.dependency_target;
         const std::string output = !arguments_.dependency_output.empty() ? arguments_.dependency_output
                                    : !arguments_.output.empty()          ? arguments_.output
                                                                          : "-";

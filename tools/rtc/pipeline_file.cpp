@@ -21,7 +21,8 @@ using Kind = JsonValue::Kind;
 
 class Reader {
   public:
-    Reader(const std::string& path, SourceFiles& files, Plan& plan) : path_(path), files_(files), plan_(plan) {}
+    Reader(const std::string& path, SourceFiles& files, Plan& plan)
+        : path_(path), files_(files), plan_(plan) {}
 
     void run() {
         const std::string name = path_ == "-" ? "<stdin>" : path_;
@@ -30,9 +31,12 @@ class Reader {
         const JsonValue* stages = nullptr;
         const JsonValue* groups = nullptr;
         for (const JsonValue::Member& member : root.members) {
-            if (member.name == "stages") stages = &check(member.value, Kind::Array);
-            else if (member.name == "groups") groups = &check(member.value, Kind::Array);
-            else unknown(member);
+            if (member.name == "stages")
+                stages = &check(member.value, Kind::Array);
+            else if (member.name == "groups")
+                groups = &check(member.value, Kind::Array);
+            else
+                unknown(member);
         }
         if (!stages) json_error(path_, root.place, "\"stages\" is missing");
         for (const JsonValue& item : stages->items) stage(item);
@@ -43,8 +47,9 @@ class Reader {
         if (groups)
             for (const auto& [index, place] : added_)
                 if (!plan_.stages[static_cast<size_t>(index)].grouped)
-                    json_error(path_, place,
-                               "stage \"" + plan_.stages[static_cast<size_t>(index)].name + "\" is in no group");
+                    json_error(
+                        path_, place,
+                        "stage \"" + plan_.stages[static_cast<size_t>(index)].name + "\" is in no group");
         if (name != "<stdin>") plan_.description_files.push_back(name);
     }
 
@@ -55,8 +60,9 @@ class Reader {
 
     const JsonValue& check(const JsonValue& value, Kind kind) const {
         if (value.kind != kind)
-            json_error(path_, value.place,
-                       std::string("expected ") + json_kind_name(kind) + ", found " + json_kind_name(value.kind));
+            json_error(
+                path_, value.place,
+                std::string("expected ") + json_kind_name(kind) + ", found " + json_kind_name(value.kind));
         return value;
     }
 
@@ -72,7 +78,8 @@ class Reader {
 
     std::string resolved(const std::string& file) const {
         const size_t slash = path_.find_last_of("/\\");
-        if (file == "-" || slash == std::string::npos || std::filesystem::path(file).is_absolute()) return file;
+        if (file == "-" || slash == std::string::npos || std::filesystem::path(file).is_absolute())
+            return file;
         return path_.substr(0, slash + 1) + file;
     }
 
@@ -89,8 +96,9 @@ class Reader {
                 kind = rtcc_stage_from_name(string(member.value).c_str());
                 if (kind == RTCC_STAGE_AUTO)
                     json_error(path_, member.value.place,
-                               "\"" + member.value.text + "\" is no stage: expected rgen, rint, rahit, rchit, rmiss "
-                               "or rcall");
+                               "\"" + member.value.text +
+                                   "\" is no stage: expected rgen, rint, rahit, rchit, rmiss "
+                                   "or rcall");
             } else if (member.name == "file") {
                 try {
                     stage.source = files_.open(resolved(string(member.value)));
@@ -152,14 +160,16 @@ class Reader {
                 continue;
             }
             const int slot = member.name == "general" || member.name == "closestHit" ? 0
-                             : member.name == "anyHit" ? 1
-                             : member.name == "intersection" ? 2 : -1;
+                             : member.name == "anyHit"                               ? 1
+                             : member.name == "intersection"                         ? 2
+                                                                                     : -1;
             if (slot < 0) unknown(member);
             (member.name == "general" ? has_general : has_hit) = true;
             if (has_general && has_hit)
                 json_error(path_, member.place, "a group is general or a hit group, not both");
             const int32_t stage = member_stage(member.value);
-            if (stage < 0 && has_general) json_error(path_, member.value.place, "a general group needs a stage");
+            if (stage < 0 && has_general)
+                json_error(path_, member.value.place, "a general group needs a stage");
             group.stages[slot] = stage;
         }
         group.general = has_general;
@@ -177,6 +187,8 @@ class Reader {
 
 }  // namespace
 
-void add_pipeline_file(const std::string& path, SourceFiles& files, Plan& plan) { Reader(path, files, plan).run(); }
+void add_pipeline_file(const std::string& path, SourceFiles& files, Plan& plan) {
+    Reader(path, files, plan).run();
+}
 
 }  // namespace cli

@@ -38,7 +38,8 @@ class Planner {
                 add_pipeline_file(input.file, files_, plan_);
             } else if (input.kind == InputArgument::Kind::HitGroup) {
                 plan_.add_group(std::move(hit_groups[next_hit_group++]), "rtc: error: ");
-            } else if (arguments_.mode == Mode::Link && !plan_.stages[static_cast<size_t>(stage_of_input_[i])].grouped) {
+            } else if (arguments_.mode == Mode::Link &&
+                       !plan_.stages[static_cast<size_t>(stage_of_input_[i])].grouped) {
                 plan_.add_own_group(stage_of_input_[i], "rtc: error: ");
             }
         }
@@ -88,15 +89,23 @@ class Planner {
             stage.grouped = true;
             size_t slot = 0;
             switch (stage.kind) {
-                case RTCC_STAGE_CLOSEST_HIT: case RTCC_STAGE_AUTO: slot = 0; break;
-                case RTCC_STAGE_ANY_HIT: slot = 1; break;
-                case RTCC_STAGE_INTERSECTION: slot = 2; break;
+                case RTCC_STAGE_CLOSEST_HIT:
+                case RTCC_STAGE_AUTO:
+                    slot = 0;
+                    break;
+                case RTCC_STAGE_ANY_HIT:
+                    slot = 1;
+                    break;
+                case RTCC_STAGE_INTERSECTION:
+                    slot = 2;
+                    break;
                 default:
                     throw UsageError("hit group '" + input.name + "': '" + text + "' is of kind " +
                                      rtcc_stage_name(stage.kind) + ", expected rchit, rahit or rint");
             }
             if (group.stages[slot] >= 0)
-                throw UsageError("hit group '" + input.name + "' has more than one " + rtcc_stage_name(stage.kind));
+                throw UsageError("hit group '" + input.name + "' has more than one " +
+                                 rtcc_stage_name(stage.kind));
             group.stages[slot] = index;
         }
         return group;
@@ -142,7 +151,8 @@ void Plan::add_own_group(int index, const std::string& where) {
     add_group(std::move(group), where);
 }
 
-rtcc_stage stage_kind_of(const SourceFile& source, rtcc_stage wanted, const std::optional<std::string>& entry) {
+rtcc_stage stage_kind_of(const SourceFile& source, rtcc_stage wanted,
+                         const std::optional<std::string>& entry) {
     if (wanted != RTCC_STAGE_AUTO) return wanted;
     if (source.is_spirv)
         return rtcc_module_stage(source.words.data(), source.words.size(), entry ? entry->c_str() : nullptr);

@@ -49,6 +49,7 @@ Plan make_plan(const Arguments& arguments, SourceFiles& files);
 // Adds what a --pipeline file says: {"stages": […], "groups": […]}, see pipeline_file.cpp.
 void add_pipeline_file(const std::string& path, SourceFiles& files, Plan& plan);
 
-rtcc_stage stage_kind_of(const SourceFile& source, rtcc_stage wanted, const std::optional<std::string>& entry);
+rtcc_stage stage_kind_of(const SourceFile& source, rtcc_stage wanted,
+                         const std::optional<std::string>& entry);
 
 }  // namespace cli

@@ -21,14 +21,15 @@ size_t widest(size_t width, const char* text) { return std::max(width, std::stri
 std::string report_text(const rtcc_reflection& r, const std::string& module) {
     std::string out = module + ": SPIR-V " + std::to_string(r.spirv_version >> 16 & 0xff) + "." +
                       std::to_string(r.spirv_version >> 8 & 0xff) + ", " +
-                      counted(r.instruction_count, "instruction") + ", " + counted(r.state_count, "state") + "\n";
+                      counted(r.instruction_count, "instruction") + ", " + counted(r.state_count, "state") +
+                      "\n";
     out += "  recursion depth " + std::to_string(r.max_recursion_depth) + ", callable depth " +
-           std::to_string(r.max_callable_depth) + ", " + (r.flags & RTC_MODULE_RESUMABLE ? "resumable" : "not resumable") +
-           "\n";
-    out += "  stack " + std::to_string(r.stack_words * 4) + " bytes, scratch " + std::to_string(r.scratch_words * 4) +
-           " bytes, payload " + std::to_string(r.payload_words * 4) + " bytes, hit attributes " +
-           std::to_string(r.attribute_words * 4) + " bytes, callable data " + std::to_string(r.callable_words * 4) +
-           " bytes a lane\n";
+           std::to_string(r.max_callable_depth) + ", " +
+           (r.flags & RTC_MODULE_RESUMABLE ? "resumable" : "not resumable") + "\n";
+    out += "  stack " + std::to_string(r.stack_words * 4) + " bytes, scratch " +
+           std::to_string(r.scratch_words * 4) + " bytes, payload " + std::to_string(r.payload_words * 4) +
+           " bytes, hit attributes " + std::to_string(r.attribute_words * 4) + " bytes, callable data " +
+           std::to_string(r.callable_words * 4) + " bytes a lane\n";
     out += "  rtc's own bindings: set " + std::to_string(r.reserved_set) + ", bindings";
     for (uint32_t i = 0; i < RTC_BINDING_COUNT; ++i)
         if (r.used_bindings >> i & 1) out += " " + std::to_string(r.reserved_binding + i);
@@ -54,14 +55,16 @@ std::string report_text(const rtcc_reflection& r, const std::string& module) {
     static const char* const kKinds[] = {"general", "triangles", "procedural"};
     out += "groups:\n";
     for (size_t i = 0; i < r.group_count; ++i)
-        out += "  " + padded(std::to_string(i), 4) + padded(kKinds[r.groups[i].kind], 12) + r.groups[i].name + "\n";
+        out += "  " + padded(std::to_string(i), 4) + padded(kKinds[r.groups[i].kind], 12) + r.groups[i].name +
+               "\n";
     if (r.trace_site_count) out += "live state saved across calls:\n";
     for (size_t i = 0; i < r.trace_site_count; ++i) {
         const rtcc_trace_site_info& site = r.trace_sites[i];
         out += std::string("  ") + (*site.file ? site.file : site.stage) +
-               (site.line ? ":" + std::to_string(site.line) : "") + ": " + (site.callable ? "callable" : "trace") + ", " +
-               counted(site.frame_bytes, "byte");
-        for (size_t k = 0; k < site.variable_count; ++k) out += std::string(k ? ", " : ": ") + site.variables[k];
+               (site.line ? ":" + std::to_string(site.line) : "") + ": " +
+               (site.callable ? "callable" : "trace") + ", " + counted(site.frame_bytes, "byte");
+        for (size_t k = 0; k < site.variable_count; ++k)
+            out += std::string(k ? ", " : ": ") + site.variables[k];
         out += "\n";
     }
     return out;

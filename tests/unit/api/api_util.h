@@ -42,12 +42,15 @@ inline const std::string kRaygen =
     "    traceNV(scene, 0, 0xff, 0, 0, 0, vec3(0.0), 0.0, vec3(0.0, 0.0, 1.0), 1e9, 0);\n"
     "    imageStore(image, ivec2(gl_LaunchIDNV.xy) + kIndex, color);\n}\n";
 
-inline Result compile_stage(const std::string& source, const char* file, rtcc_const_options_t options = nullptr) {
+inline Result compile_stage(const std::string& source, const char* file,
+                            rtcc_const_options_t options = nullptr) {
     Compiler compiler(rtcc_compiler_create());
-    return Result(rtcc_compile_stage(compiler.get(), RTCC_STAGE_AUTO, file, source.data(), source.size(), options));
+    return Result(
+        rtcc_compile_stage(compiler.get(), RTCC_STAGE_AUTO, file, source.data(), source.size(), options));
 }
 
-inline int32_t add(const Pipeline& pipeline, const std::string& source, const char* file, const char* name = nullptr) {
+inline int32_t add(const Pipeline& pipeline, const std::string& source, const char* file,
+                   const char* name = nullptr) {
     return rtcc_pipeline_add_glsl(pipeline.get(), RTCC_STAGE_AUTO, name, file, source.data(), source.size());
 }
 

@@ -41,8 +41,10 @@ TEST(Compile, ExtStagesAreParsedForVulkan12WithSpirv14) {
 }
 
 TEST(Compile, ErrorsComeAsStructuresAndText) {
-    const Result result = compile_stage("#version 460\n#extension GL_NV_ray_tracing : require\n"
-                                        "void main() {\n  int x = nothing;\n}\n", "bad.rmiss");
+    const Result result = compile_stage(
+        "#version 460\n#extension GL_NV_ray_tracing : require\n"
+        "void main() {\n  int x = nothing;\n}\n",
+        "bad.rmiss");
     EXPECT_EQ(rtcc_result_status(result.get()), RTCC_STATUS_COMPILATION_ERROR);
     EXPECT_EQ(rtcc_result_words(result.get()), nullptr);
     EXPECT_EQ(rtcc_result_word_count(result.get()), 0u);
@@ -82,11 +84,13 @@ TEST(Compile, NullArgumentsAreErrorsNotCrashes) {
               RTCC_STATUS_INVALID_ARGUMENT);
     EXPECT_EQ(rtcc_result_status(Result(rtcc_compile_pipeline(compiler.get(), nullptr, nullptr)).get()),
               RTCC_STATUS_INVALID_ARGUMENT);
+    EXPECT_EQ(
+        rtcc_result_status(
+            Result(rtcc_compile_stage(compiler.get(), RTCC_STAGE_MISS, nullptr, nullptr, 5, nullptr)).get()),
+        RTCC_STATUS_INVALID_ARGUMENT);
     EXPECT_EQ(rtcc_result_status(
-                  Result(rtcc_compile_stage(compiler.get(), RTCC_STAGE_MISS, nullptr, nullptr, 5, nullptr)).get()),
-              RTCC_STATUS_INVALID_ARGUMENT);
-    EXPECT_EQ(rtcc_result_status(Result(rtcc_compile_stage(compiler.get(), static_cast<rtcc_stage>(77), "", "", 0,
-                                                           nullptr)).get()),
+                  Result(rtcc_compile_stage(compiler.get(), static_cast<rtcc_stage>(77), "", "", 0, nullptr))
+                      .get()),
               RTCC_STATUS_INVALID_ARGUMENT);
     EXPECT_EQ(rtcc_result_status(Result(rtcc_reflect_module(compiler.get(), nullptr, nullptr, 3)).get()),
               RTCC_STATUS_INVALID_ARGUMENT);

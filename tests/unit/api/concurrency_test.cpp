@@ -15,7 +15,8 @@ TEST(Concurrency, SeparateObjectsGiveTheSameBytes) {
     std::vector<std::string> made(kThreads);
     std::vector<std::thread> threads;
     for (int i = 0; i < kThreads; ++i)
-        threads.emplace_back([&made, i] { made[static_cast<size_t>(i)] = bytes_of(compile(small_pipeline())); });
+        threads.emplace_back(
+            [&made, i] { made[static_cast<size_t>(i)] = bytes_of(compile(small_pipeline())); });
     for (std::thread& thread : threads) thread.join();
     for (const std::string& bytes : made) EXPECT_EQ(bytes, expected);
 }
@@ -49,8 +50,9 @@ TEST(Concurrency, DifferentSourcesDoNotMeet) {
             for (int round = 0; round < 4; ++round) {
                 const Result result = compile_stage(source, file.c_str());
                 const rtcc_diagnostic message = rtcc_result_diagnostic(result.get(), 0);
-                const bool own = message.file == file && message.line == static_cast<uint32_t>(i) + 3 &&
-                                 std::string(message.text).find("wrong" + std::to_string(i)) != std::string::npos;
+                const bool own =
+                    message.file == file && message.line == static_cast<uint32_t>(i) + 3 &&
+                    std::string(message.text).find("wrong" + std::to_string(i)) != std::string::npos;
                 good[static_cast<size_t>(i)] += own;
             }
         });

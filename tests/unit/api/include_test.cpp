@@ -22,8 +22,8 @@ struct Library {
     static rtcc_include_result* resolve(void* user, const char* requested, rtcc_include_type type,
                                         const char* includer, size_t depth) {
         auto* self = static_cast<Library*>(user);
-        self->asked.push_back(std::string(type == RTCC_INCLUDE_QUOTED ? "\"" : "<") + requested + " from " + includer +
-                              " at " + std::to_string(depth));
+        self->asked.push_back(std::string(type == RTCC_INCLUDE_QUOTED ? "\"" : "<") + requested + " from " +
+                              includer + " at " + std::to_string(depth));
         auto* answer = new Answer;
         const auto found = self->files.find(requested);
         if (found != self->files.end()) {
@@ -32,8 +32,8 @@ struct Library {
         } else {
             answer->content = "the library has no such file";
         }
-        answer->result = {answer->name.c_str(), answer->name.size(), answer->content.c_str(), answer->content.size(),
-                          answer};
+        answer->result = {answer->name.c_str(), answer->name.size(), answer->content.c_str(),
+                          answer->content.size(), answer};
         ++self->out;
         return &answer->result;
     }
@@ -84,9 +84,8 @@ TEST(Include, TheCallbacksReasonIsReported) {
 
 TEST(Include, ACallbackMayReturnNothing) {
     Options options(rtcc_options_create());
-    const auto nothing = [](void*, const char*, rtcc_include_type, const char*, size_t) -> rtcc_include_result* {
-        return nullptr;
-    };
+    const auto nothing = [](void*, const char*, rtcc_include_type, const char*,
+                            size_t) -> rtcc_include_result* { return nullptr; };
     rtcc_options_set_include_callbacks(options.get(), nothing, nullptr, nullptr);
     EXPECT_EQ(rtcc_result_status(compile_stage(kSource, "top.rmiss", options.get()).get()),
               RTCC_STATUS_COMPILATION_ERROR);
@@ -97,8 +96,9 @@ TEST(Include, AnIncludeMayChooseTheDialect) {
     library.files = {{"a.glsl", "#extension GL_EXT_ray_tracing : require\nvoid f() {}\n"}};
     Options options(rtcc_options_create());
     rtcc_options_set_include_callbacks(options.get(), Library::resolve, Library::release, &library);
-    const std::string source = "#version 460\n#include \"a.glsl\"\n"
-                               "layout(location = 0) rayPayloadInEXT vec4 color;\nvoid main() { f(); }\n";
+    const std::string source =
+        "#version 460\n#include \"a.glsl\"\n"
+        "layout(location = 0) rayPayloadInEXT vec4 color;\nvoid main() { f(); }\n";
     const Result result = compile_stage(source, "top.rmiss", options.get());
     ASSERT_EQ(rtcc_result_status(result.get()), RTCC_STATUS_SUCCESS) << rtcc_result_messages(result.get());
     EXPECT_EQ(rtcc_result_words(result.get())[1], 0x00010400u);

@@ -13,7 +13,8 @@ TEST(OptionsTest, MacrosReachTheSource) {
     EXPECT_EQ(rtcc_result_status(compile_stage(kNeedsMacro, "a.rmiss", options.get()).get()),
               RTCC_STATUS_COMPILATION_ERROR);
     EXPECT_EQ(rtcc_options_add_macro(options.get(), "VALUE", "0.5"), RTCC_STATUS_SUCCESS);
-    EXPECT_EQ(rtcc_result_status(compile_stage(kNeedsMacro, "a.rmiss", options.get()).get()), RTCC_STATUS_SUCCESS);
+    EXPECT_EQ(rtcc_result_status(compile_stage(kNeedsMacro, "a.rmiss", options.get()).get()),
+              RTCC_STATUS_SUCCESS);
     EXPECT_EQ(rtcc_options_undefine_macro(options.get(), "VALUE"), RTCC_STATUS_SUCCESS);
     EXPECT_EQ(rtcc_result_status(compile_stage(kNeedsMacro, "a.rmiss", options.get()).get()),
               RTCC_STATUS_COMPILATION_ERROR);
@@ -24,7 +25,8 @@ TEST(OptionsTest, ACloneSharesNothing) {
     rtcc_options_add_macro(options.get(), "VALUE", "0.5");
     Options clone(rtcc_options_clone(options.get()));
     rtcc_options_undefine_macro(options.get(), "VALUE");
-    EXPECT_EQ(rtcc_result_status(compile_stage(kNeedsMacro, "a.rmiss", clone.get()).get()), RTCC_STATUS_SUCCESS);
+    EXPECT_EQ(rtcc_result_status(compile_stage(kNeedsMacro, "a.rmiss", clone.get()).get()),
+              RTCC_STATUS_SUCCESS);
     EXPECT_EQ(rtcc_result_status(compile_stage(kNeedsMacro, "a.rmiss", options.get()).get()),
               RTCC_STATUS_COMPILATION_ERROR);
     EXPECT_NE(Options(rtcc_options_clone(nullptr)), nullptr);
@@ -46,7 +48,8 @@ TEST(OptionsTest, BadValuesAreRefusedAndChangeNothing) {
     EXPECT_EQ(rtcc_options_set_max_callable_depth(o, 32), RTCC_STATUS_INVALID_ARGUMENT);
     EXPECT_EQ(rtcc_options_set_reserved(o, -2, 0), RTCC_STATUS_INVALID_ARGUMENT);
     EXPECT_EQ(rtcc_options_set_target_env(o, static_cast<rtcc_target_env>(9)), RTCC_STATUS_INVALID_ARGUMENT);
-    EXPECT_EQ(rtcc_options_set_optimization(o, static_cast<rtcc_optimization>(9)), RTCC_STATUS_INVALID_ARGUMENT);
+    EXPECT_EQ(rtcc_options_set_optimization(o, static_cast<rtcc_optimization>(9)),
+              RTCC_STATUS_INVALID_ARGUMENT);
     EXPECT_EQ(rtcc_options_add_include_directory(o, nullptr), RTCC_STATUS_INVALID_ARGUMENT);
     EXPECT_EQ(rtcc_options_set_debug_info(nullptr, 1), RTCC_STATUS_INVALID_ARGUMENT);
     EXPECT_EQ(rtcc_result_status(compile_stage(kNeedsMacro, "a.rmiss", o).get()), RTCC_STATUS_SUCCESS);
@@ -54,7 +57,8 @@ TEST(OptionsTest, BadValuesAreRefusedAndChangeNothing) {
 
 TEST(OptionsTest, WarningsCanBeErrorsOrSilent) {
     const std::string source =
-        "#version 460\n#extension GL_NV_ray_tracing : require\n#extension GL_XX_unknown : enable\nvoid main() {}\n";
+        "#version 460\n#extension GL_NV_ray_tracing : require\n#extension GL_XX_unknown : enable\nvoid "
+        "main() {}\n";
     Options options(rtcc_options_create());
     EXPECT_EQ(rtcc_result_warning_count(compile_stage(source, "a.rmiss", options.get()).get()), 1u);
     rtcc_options_set_warnings_as_errors(options.get(), 1);
@@ -73,7 +77,8 @@ TEST(OptionsTest, DebugInfoOfOneStage) {
     EXPECT_THAT(rtcc_result_assembly(compile_stage(kMiss, "a.rmiss", options.get()).get()),
                 ::testing::Not(HasSubstr("OpLine")));
     rtcc_options_set_debug_info(options.get(), 1);
-    EXPECT_THAT(rtcc_result_assembly(compile_stage(kMiss, "a.rmiss", options.get()).get()), HasSubstr("OpLine"));
+    EXPECT_THAT(rtcc_result_assembly(compile_stage(kMiss, "a.rmiss", options.get()).get()),
+                HasSubstr("OpLine"));
 }
 
 TEST(OptionsTest, GlslVersionOverridesTheSource) {

@@ -95,7 +95,8 @@ TEST(PipelineTest, DamagedSpirvIsAnError) {
                                                                 damaged.data(), damaged.size(), nullptr));
         const Result result = compile(pipeline);
         ASSERT_NE(result, nullptr);
-        EXPECT_EQ(rtcc_result_status(result.get()) == RTCC_STATUS_SUCCESS, rtcc_result_error_count(result.get()) == 0)
+        EXPECT_EQ(rtcc_result_status(result.get()) == RTCC_STATUS_SUCCESS,
+                  rtcc_result_error_count(result.get()) == 0)
             << "word " << i;
     }
 }
@@ -107,7 +108,8 @@ TEST(PipelineTest, SpecialisationByBitsAndByText) {
                           : rtcc_pipeline_specialize(pipeline.get(), 0, 5, 0xfffffffd),
                   RTCC_STATUS_SUCCESS);
         const Result result = compile(pipeline);
-        EXPECT_EQ(rtcc_result_status(result.get()), RTCC_STATUS_SUCCESS) << rtcc_result_messages(result.get());
+        EXPECT_EQ(rtcc_result_status(result.get()), RTCC_STATUS_SUCCESS)
+            << rtcc_result_messages(result.get());
         return bytes_of(result);
     };
     EXPECT_EQ(module(true), module(false));

@@ -23,7 +23,8 @@ TEST(SharedLibrary, ExportsOnlyTheInterface) {
         Elf64_Shdr section, strings;
         std::memcpy(&section, bytes.data() + header.e_shoff + i * sizeof section, sizeof section);
         if (section.sh_type != SHT_DYNSYM) continue;
-        std::memcpy(&strings, bytes.data() + header.e_shoff + section.sh_link * sizeof strings, sizeof strings);
+        std::memcpy(&strings, bytes.data() + header.e_shoff + section.sh_link * sizeof strings,
+                    sizeof strings);
         for (size_t at = 0; at < section.sh_size; at += sizeof(Elf64_Sym)) {
             Elf64_Sym symbol;
             std::memcpy(&symbol, bytes.data() + section.sh_offset + at, sizeof symbol);

@@ -16,17 +16,19 @@ TEST_F(BadInput, NoInput) {
 
 TEST_F(BadInput, UnknownOptions) {
     write("a.rmiss", miss_shader());
-    for (const char* option : {"-fnothing", "--nothing", "--nothing=3", "-Z", "--report=yes", "-mfmt", "-Wall", "-std"}) {
+    for (const char* option :
+         {"-fnothing", "--nothing", "--nothing=3", "-Z", "--report=yes", "-mfmt", "-Wall", "-std"}) {
         const CliRun run = rtc("a.rmiss " + std::string(option));
         EXPECT_EQ(run.status, 2) << option;
-        EXPECT_THAT(run.err, StartsWith("rtc: error: unknown argument: '" + std::string(option) + "'")) << option;
+        EXPECT_THAT(run.err, StartsWith("rtc: error: unknown argument: '" + std::string(option) + "'"))
+            << option;
     }
 }
 
 TEST_F(BadInput, OptionsWithoutTheirValue) {
-    for (const char* option : {"-o", "-D", "-U", "-I", "-MF", "-MT", "-x", "--hit-group", "--stage", "--pipeline",
-                               "--reflect", "--target-env", "--max-recursion-depth", "--max-callable-depth",
-                               "--reserved", "--dump-after"}) {
+    for (const char* option :
+         {"-o", "-D", "-U", "-I", "-MF", "-MT", "-x", "--hit-group", "--stage", "--pipeline", "--reflect",
+          "--target-env", "--max-recursion-depth", "--max-callable-depth", "--reserved", "--dump-after"}) {
         const CliRun run = rtc("a.rmiss " + std::string(option));
         EXPECT_EQ(run.status, 2) << option;
         EXPECT_THAT(run.err, HasSubstr("argument to '" + std::string(option) + "' is missing")) << option;
@@ -89,7 +91,8 @@ TEST_F(BadInput, TruncatedSpirv) {
     write("a.rgen", raygen_shader());
     ASSERT_EQ(rtc("-c a.rmiss").status, 0);
     const std::string whole = read("a.rmiss.spv");
-    for (size_t size : {size_t{4}, size_t{16}, size_t{19}, size_t{24}, whole.size() / 2 + 1, whole.size() - 3}) {
+    for (size_t size :
+         {size_t{4}, size_t{16}, size_t{19}, size_t{24}, whole.size() / 2 + 1, whole.size() - 3}) {
         write("cut.spv", whole.substr(0, size));
         const CliRun run = rtc("a.rgen cut.spv");
         EXPECT_EQ(run.status, 1) << size;
@@ -157,15 +160,19 @@ TEST_F(BadInput, PipelineFiles) {
         {"{\n  \"stages\": [\n    {\"file\": \"a.rgen\", \"color\": 1}\n  ]\n}",
          "p.json:3:24: error: unknown member \"color\""},
         {"{\"stages\": [{\"name\": \"x\"}]}", "p.json:1:13: error: \"file\" is missing"},
-        {"{\"stages\": [{\"file\": \"gone.rgen\"}]}", "p.json:1:22: error: cannot open input file: 'gone.rgen'"},
+        {"{\"stages\": [{\"file\": \"gone.rgen\"}]}",
+         "p.json:1:22: error: cannot open input file: 'gone.rgen'"},
         {"{\"stages\": [{\"file\": \"bad.spv\"}]}", "bad.spv: error: not a SPIR-V module"},
-        {"{\"stages\": [{\"file\": \"a.rgen\", \"kind\": \"vert\"}]}", "p.json:1:40: error: \"vert\" is no stage"},
+        {"{\"stages\": [{\"file\": \"a.rgen\", \"kind\": \"vert\"}]}",
+         "p.json:1:40: error: \"vert\" is no stage"},
         {"{\"stages\": [{\"file\": \"a.rgen\"}, {\"file\": \"a.rgen\"}]}", "two stages are named 'a.rgen'"},
-        {"{\"stages\": [{\"file\": \"a.rgen\", \"file\": \"a.rgen\"}]}", "p.json:1:32: error: duplicate name \"file\""},
+        {"{\"stages\": [{\"file\": \"a.rgen\", \"file\": \"a.rgen\"}]}",
+         "p.json:1:32: error: duplicate name \"file\""},
         {"{\"stages\": [{\"file\": \"a.rgen\"}], \"groups\": [{\"general\": \"b\"}]}",
          "p.json:1:57: error: no stage is named \"b\""},
         {"{\"stages\": [{\"file\": \"a.rgen\"}], \"groups\": []}", "error: stage \"a.rgen\" is in no group"},
-        {"{\"stages\": [{\"file\": \"a.rgen\"}], \"groups\": [{\"general\": \"a.rgen\", \"anyHit\": \"a.rgen\"}]}",
+        {"{\"stages\": [{\"file\": \"a.rgen\"}], \"groups\": [{\"general\": \"a.rgen\", \"anyHit\": "
+         "\"a.rgen\"}]}",
          "error: a group is general or a hit group, not both"},
         {"{\"stages\": [{\"file\": \"a.rgen\"}], \"groups\": [{\"name\": \"a\", \"general\": \"a.rgen\"},"
          " {\"name\": \"a\"}]}",
@@ -198,29 +205,33 @@ TEST_F(BadInput, NumberedColumnsCountCharacters) {
 // ---- Spellings of the 2019 talk and of early headers ------------------------------
 
 TEST_F(BadInput, SeedSpellingsNameTheReplacement) {
-    write("a.rchit", "#version 460\n#extension GL_NV_ray_tracing : require\n"
-                     "rayPayloadInNV primaryPayload { vec4 color; } p;\n"
-                     "void main() {\n"
-                     "    p.color = vec4(gl_hitTNV);\n"
-                     "    p.color.xyz = vec3(gl_GlobalInvocationIDNV);\n}\n");
+    write("a.rchit",
+          "#version 460\n#extension GL_NV_ray_tracing : require\n"
+          "rayPayloadInNV primaryPayload { vec4 color; } p;\n"
+          "void main() {\n"
+          "    p.color = vec4(gl_hitTNV);\n"
+          "    p.color.xyz = vec3(gl_GlobalInvocationIDNV);\n}\n");
     const CliRun run = rtc("-c a.rchit");
     EXPECT_EQ(run.status, 1);
     EXPECT_THAT(run.err, HasSubstr("a.rchit:5: error: 'gl_hitTNV' : undeclared identifier; write gl_HitTNV"));
-    EXPECT_THAT(run.err, HasSubstr("a.rchit:6: error: 'gl_GlobalInvocationIDNV' : undeclared identifier; write "
-                                   "gl_LaunchIDNV"));
+    EXPECT_THAT(run.err,
+                HasSubstr("a.rchit:6: error: 'gl_GlobalInvocationIDNV' : undeclared identifier; write "
+                          "gl_LaunchIDNV"));
 }
 
 TEST_F(BadInput, DeclarationsWithoutUniform) {
-    write("a.rgen", "#version 460\n#extension GL_NV_ray_tracing : require\n"
-                    "layout(set = 0, binding = 0) accelerationStructureNV scene;\nvoid main() {}\n");
+    write("a.rgen",
+          "#version 460\n#extension GL_NV_ray_tracing : require\n"
+          "layout(set = 0, binding = 0) accelerationStructureNV scene;\nvoid main() {}\n");
     EXPECT_THAT(rtc("-c a.rgen").err, HasSubstr("a.rgen:3: error: "));
     EXPECT_THAT(rtc("-c a.rgen").err, HasSubstr("write `uniform` before the type"));
 }
 
 TEST_F(BadInput, BlocksUsedByTheirName) {
-    write("a.rgen", "#version 460\n#extension GL_NV_ray_tracing : require\n"
-                    "layout(location = 1) rayPayloadNV primaryPayload { vec4 color; };\n"
-                    "void main() { primaryPayload.color = vec4(0.0); }\n");
+    write("a.rgen",
+          "#version 460\n#extension GL_NV_ray_tracing : require\n"
+          "layout(location = 1) rayPayloadNV primaryPayload { vec4 color; };\n"
+          "void main() { primaryPayload.color = vec4(0.0); }\n");
     const CliRun run = rtc("-c a.rgen");
     EXPECT_THAT(run.err, HasSubstr("a.rgen:4: error: "));
     EXPECT_THAT(run.err, HasSubstr("give the block an instance"));
@@ -228,21 +239,25 @@ TEST_F(BadInput, BlocksUsedByTheirName) {
 }
 
 TEST_F(BadInput, BlocksWithoutASemicolon) {
-    write("a.rgen", "#version 460\n#extension GL_NV_ray_tracing : require\n"
-                    "layout(location = 1) rayPayloadNV primaryPayload {\n    vec4 color;\n}\n\nvoid main() {}\n");
+    write("a.rgen",
+          "#version 460\n#extension GL_NV_ray_tracing : require\n"
+          "layout(location = 1) rayPayloadNV primaryPayload {\n    vec4 color;\n}\n\nvoid main() {}\n");
     EXPECT_THAT(rtc("-c a.rgen").err, HasSubstr("end it with `};` or an instance name"));
 }
 
 TEST_F(BadInput, NoExtension) {
-    write("a.rgen", "#version 460\nlayout(set = 0, binding = 0) uniform accelerationStructureNV scene;\nvoid main() {}\n");
+    write("a.rgen",
+          "#version 460\nlayout(set = 0, binding = 0) uniform accelerationStructureNV scene;\nvoid main() "
+          "{}\n");
     EXPECT_THAT(rtc("-c a.rgen").err, HasSubstr("write #extension GL_NV_ray_tracing : require"));
     write("b.rgen", "#version 460\n#extension GL_NVX_raytracing : require\nvoid main() {}\n");
     EXPECT_THAT(rtc("-c b.rgen").err, HasSubstr("write #extension GL_NV_ray_tracing : require"));
 }
 
 TEST_F(BadInput, PositionFetchIsNamed) {
-    write("a.rchit", "#version 460\n#extension GL_EXT_ray_tracing : require\n"
-                     "#extension GL_EXT_ray_tracing_position_fetch : require\nvoid main() {}\n");
+    write("a.rchit",
+          "#version 460\n#extension GL_EXT_ray_tracing : require\n"
+          "#extension GL_EXT_ray_tracing_position_fetch : require\nvoid main() {}\n");
     const CliRun run = rtc("-c a.rchit");
     EXPECT_EQ(run.status, 1);
     EXPECT_THAT(run.err, HasSubstr("a.rchit:3: error: "));

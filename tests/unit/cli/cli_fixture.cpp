@@ -1,8 +1,8 @@
 #include "cli_fixture.h"
 
-#include <spirv-tools/libspirv.hpp>
 #include <sys/wait.h>
 #include <unistd.h>
+#include <spirv-tools/libspirv.hpp>
 
 #include <cstdlib>
 #include <cstring>
@@ -24,8 +24,8 @@ Cli::~Cli() {
 
 CliRun Cli::rtc(const std::string& arguments, const std::string& standard_input) {
     write(".stdin", standard_input);
-    const std::string command = "cd '" + folder_.string() + "' && '" RTC_PROGRAM "' " + arguments +
-                                " <.stdin >.stdout 2>.stderr";
+    const std::string command =
+        "cd '" + folder_.string() + "' && '" RTC_PROGRAM "' " + arguments + " <.stdin >.stdout 2>.stderr";
     const int status = std::system(command.c_str());
     CliRun run;
     run.status = WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
@@ -56,7 +56,8 @@ bool Cli::exists(const std::string& name) const { return fs::exists(folder_ / na
 
 void Cli::copy_shaders(const std::string& dialect, const std::string& folder) const {
     fs::create_directories(folder_ / folder);
-    fs::copy(fs::path(RTC_SHADERS) / dialect, folder_ / folder, fs::copy_options::overwrite_existing | fs::copy_options::recursive);
+    fs::copy(fs::path(RTC_SHADERS) / dialect, folder_ / folder,
+             fs::copy_options::overwrite_existing | fs::copy_options::recursive);
 }
 
 std::string miss_shader(const std::string& body) {
@@ -89,7 +90,8 @@ bool is_module(const std::string& bytes) {
 
 std::string disassembled(const std::string& bytes) {
     std::string text;
-    spvtools::SpirvTools(SPV_ENV_UNIVERSAL_1_6).Disassemble(words_of(bytes), &text, SPV_BINARY_TO_TEXT_OPTION_NONE);
+    spvtools::SpirvTools(SPV_ENV_UNIVERSAL_1_6)
+        .Disassemble(words_of(bytes), &text, SPV_BINARY_TO_TEXT_OPTION_NONE);
     return text;
 }
 

@@ -9,9 +9,10 @@ namespace {
 class Diagnostics : public Cli {
   protected:
     // `enable` of an unknown extension is a warning in GLSL.
-    const std::string warning_ = "#version 460\n#extension GL_NV_ray_tracing : require\n"
-                                 "#extension GL_XX_no_such_thing : enable\n"
-                                 "layout(location = 0) rayPayloadInNV vec4 c;\nvoid main() { c = vec4(0.0); }\n";
+    const std::string warning_ =
+        "#version 460\n#extension GL_NV_ray_tracing : require\n"
+        "#extension GL_XX_no_such_thing : enable\n"
+        "layout(location = 0) rayPayloadInNV vec4 c;\nvoid main() { c = vec4(0.0); }\n";
 };
 
 TEST_F(Diagnostics, ErrorsReadFileLineErrorText) {
@@ -107,11 +108,12 @@ TEST_F(Diagnostics, AMissingVersionIsNamedAndNothingElsePrinted) {
 }
 
 TEST_F(Diagnostics, ALinkErrorNamesTheSourceLine) {
-    write("a.rgen", "#version 460\n#extension GL_NV_ray_tracing : require\n"
-                    "layout(set = 0, binding = 0) uniform accelerationStructureNV scene;\n"
-                    "layout(location = 0) rayPayloadNV vec4 color;\n"
-                    "void main() {\n"
-                    "    traceNV(scene, 0, 0xff, 0, 0, 0, vec3(0.0), 0.0, vec3(0.0, 0.0, 1.0), 1e9, 3);\n}\n");
+    write("a.rgen",
+          "#version 460\n#extension GL_NV_ray_tracing : require\n"
+          "layout(set = 0, binding = 0) uniform accelerationStructureNV scene;\n"
+          "layout(location = 0) rayPayloadNV vec4 color;\n"
+          "void main() {\n"
+          "    traceNV(scene, 0, 0xff, 0, 0, 0, vec3(0.0), 0.0, vec3(0.0, 0.0, 1.0), 1e9, 3);\n}\n");
     const CliRun run = rtc("a.rgen");
     EXPECT_EQ(run.status, 1);
     EXPECT_THAT(run.err, HasSubstr("a.rgen:6: error: "));

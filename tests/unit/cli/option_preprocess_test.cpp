@@ -112,7 +112,8 @@ TEST_F(Preprocess, AnglesSkipTheFilesFolder) {
 }
 
 TEST_F(Preprocess, AMissingIncludeIsNamed) {
-    write("a.rmiss", "#version 460\n#extension GL_NV_ray_tracing : require\n#include \"gone.glsl\"\nvoid main() {}\n");
+    write("a.rmiss",
+          "#version 460\n#extension GL_NV_ray_tracing : require\n#include \"gone.glsl\"\nvoid main() {}\n");
     const CliRun run = rtc("-c a.rmiss");
     EXPECT_EQ(run.status, 1);
     EXPECT_THAT(run.err, HasSubstr("a.rmiss:3: error:"));
@@ -128,7 +129,8 @@ TEST_F(Preprocess, AFileThatIncludesItselfEnds) {
 }
 
 TEST_F(Preprocess, ErrorsInIncludesNameTheInclude) {
-    write("a.rmiss", "#version 460\n#extension GL_NV_ray_tracing : require\n#include \"bad.glsl\"\nvoid main() {}\n");
+    write("a.rmiss",
+          "#version 460\n#extension GL_NV_ray_tracing : require\n#include \"bad.glsl\"\nvoid main() {}\n");
     write("bad.glsl", "\nint x = missing;\n");
     const CliRun run = rtc("-c a.rmiss");
     EXPECT_EQ(run.status, 1);
@@ -151,7 +153,8 @@ TEST_F(Preprocess, PragmaBeatsTheExtension) {
 }
 
 TEST_F(Preprocess, PragmasThatDisagreeAreAnError) {
-    write("sky.glsl", "#version 460\n#pragma shader_stage(miss)\n#pragma shader_stage(raygen)\nvoid main() {}\n");
+    write("sky.glsl",
+          "#version 460\n#pragma shader_stage(miss)\n#pragma shader_stage(raygen)\nvoid main() {}\n");
     const CliRun run = rtc("-c sky.glsl");
     EXPECT_EQ(run.status, 1);
     EXPECT_THAT(run.err, HasSubstr("sky.glsl:3: error: '#pragma shader_stage(raygen)' conflicts"));
@@ -161,7 +164,8 @@ TEST_F(Preprocess, PragmaOfAnotherKindOfShaderIsAnError) {
     write("sky.glsl", "#version 460\n#pragma shader_stage(fragment)\nvoid main() {}\n");
     const CliRun run = rtc("-c sky.glsl");
     EXPECT_EQ(run.status, 1);
-    EXPECT_THAT(run.err, HasSubstr("sky.glsl:2: error: '#pragma shader_stage(fragment)' names no ray tracing stage"));
+    EXPECT_THAT(run.err,
+                HasSubstr("sky.glsl:2: error: '#pragma shader_stage(fragment)' names no ray tracing stage"));
 }
 
 }  // namespace

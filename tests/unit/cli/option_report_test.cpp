@@ -73,14 +73,15 @@ TEST_F(Report, ReportSaysStatesAndTraceSites) {
 
 // Ray generation keeps its variables in registers; a closest-hit that traces has a frame.
 TEST_F(Report, ReportNamesWhatIsSaved) {
-    write("again.rchit", "#version 460\n#extension GL_NV_ray_tracing : require\n"
-                         "layout(set = 0, binding = 0) uniform accelerationStructureNV scene;\n"
-                         "layout(location = 0) rayPayloadInNV vec4 color;\n"
-                         "layout(location = 1) rayPayloadNV vec4 inner;\n"
-                         "void main() {\n"
-                         "    vec2 kept = gl_WorldRayDirectionNV.xy * gl_HitTNV;\n"
-                         "    traceNV(scene, 0, 0xff, 0, 0, 0, vec3(1.0), 0.0, vec3(0, 1, 0), 1e9, 1);\n"
-                         "    color = inner + kept.xyxy;\n}\n");
+    write("again.rchit",
+          "#version 460\n#extension GL_NV_ray_tracing : require\n"
+          "layout(set = 0, binding = 0) uniform accelerationStructureNV scene;\n"
+          "layout(location = 0) rayPayloadInNV vec4 color;\n"
+          "layout(location = 1) rayPayloadNV vec4 inner;\n"
+          "void main() {\n"
+          "    vec2 kept = gl_WorldRayDirectionNV.xy * gl_HitTNV;\n"
+          "    traceNV(scene, 0, 0xff, 0, 0, 0, vec3(1.0), 0.0, vec3(0, 1, 0), 1e9, 1);\n"
+          "    color = inner + kept.xyxy;\n}\n");
     const CliRun run = rtc("camera.rgen sky.rmiss again.rchit --max-recursion-depth=2 --report -o out.spv");
     EXPECT_EQ(run.status, 0) << run.err;
     EXPECT_THAT(run.out, HasSubstr("camera.rgen:21: trace, 0 bytes\n"));
@@ -111,11 +112,43 @@ TEST_F(Report, Help) {
     EXPECT_EQ(run.status, 0);
     EXPECT_EQ(run.err, "");
     EXPECT_EQ(rtc("-h").out, run.out);
-    for (const char* option :
-         {"-c ", "-D", "--dump-after", "-E ", "-fentry-point=", "-fshader-stage=", "-g ", "--hit-group", "-I", "-M ",
-          "-MM ", "-MD ", "-MF ", "-MT ", "--max-callable-depth", "--max-recursion-depth", "-mfmt=", "--no-resumable",
-          "--no-validate", "-O ", "-Os ", "-O0 ", "-o ", "--pipeline", "--reflect", "--report", "--reserved", "-S ",
-          "--stage", "-std=", "--target-env", "-U", "--version", "-w ", "-Werror ", "-x ", "@<file>"})
+    for (const char* option : {"-c ",
+                               "-D",
+                               "--dump-after",
+                               "-E ",
+                               "-fentry-point=",
+                               "-fshader-stage=",
+                               "-g ",
+                               "--hit-group",
+                               "-I",
+                               "-M ",
+                               "-MM ",
+                               "-MD ",
+                               "-MF ",
+                               "-MT ",
+                               "--max-callable-depth",
+                               "--max-recursion-depth",
+                               "-mfmt=",
+                               "--no-resumable",
+                               "--no-validate",
+                               "-O ",
+                               "-Os ",
+                               "-O0 ",
+                               "-o ",
+                               "--pipeline",
+                               "--reflect",
+                               "--report",
+                               "--reserved",
+                               "-S ",
+                               "--stage",
+                               "-std=",
+                               "--target-env",
+                               "-U",
+                               "--version",
+                               "-w ",
+                               "-Werror ",
+                               "-x ",
+                               "@<file>"})
         EXPECT_THAT(run.out, HasSubstr(std::string("\n  ") + option)) << option;
 }
 

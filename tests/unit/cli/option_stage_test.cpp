@@ -48,7 +48,8 @@ TEST_F(Stages, AnRchitInAHitGroupIsNoGroupOfItsOwn) {
 }
 
 TEST_F(Stages, OneStageMayServeSeveralHitGroups) {
-    const auto json = reflection("camera.rgen sky.rmiss --hit-group a=shade.rchit --hit-group b=shade.rchit,cutout.rahit");
+    const auto json =
+        reflection("camera.rgen sky.rmiss --hit-group a=shade.rchit --hit-group b=shade.rchit,cutout.rahit");
     EXPECT_EQ(json["groups"].size(), 4u);
     EXPECT_EQ(json["stages"].size(), 4u) << "shade.rchit is one stage";
     EXPECT_EQ(json["groups"][2]["handle"][0], json["groups"][3]["handle"][0]);
@@ -67,7 +68,8 @@ TEST_F(Stages, HitGroupMistakes) {
     EXPECT_EQ(rtc("camera.rgen --hit-group g=gone.rchit").status, 1);
     CliRun run = rtc("camera.rgen sky.rmiss --hit-group g=sky.rmiss");
     EXPECT_EQ(run.status, 2);
-    EXPECT_THAT(run.err, HasSubstr("hit group 'g': 'sky.rmiss' is of kind rmiss, expected rchit, rahit or rint"));
+    EXPECT_THAT(run.err,
+                HasSubstr("hit group 'g': 'sky.rmiss' is of kind rmiss, expected rchit, rahit or rint"));
     write("other.rchit", read("shade.rchit"));
     run = rtc("camera.rgen --hit-group g=shade.rchit,other.rchit");
     EXPECT_EQ(run.status, 2);
@@ -112,15 +114,17 @@ TEST_F(Stages, FentryPointChoosesAmongEntryPoints) {
     EXPECT_EQ(run.status, 0) << run.err;
     run = rtc("camera.rgen -fentry-point=other sky.rmiss.spv");
     EXPECT_EQ(run.status, 1);
-    EXPECT_THAT(run.err, HasSubstr("sky.rmiss.spv: error: the module has no ray tracing entry point 'other'"));
+    EXPECT_THAT(run.err,
+                HasSubstr("sky.rmiss.spv: error: the module has no ray tracing entry point 'other'"));
     EXPECT_THAT(run.err, HasSubstr("it has rmiss 'main'"));
     EXPECT_EQ(rtc("-fentry-point= camera.rgen").status, 2);
 }
 
 TEST_F(Stages, StageNamesKindFileEntryAndConstants) {
     ASSERT_EQ(rtc("-c camera.rgen").status, 0);
-    const auto json = reflection("--stage dark=rgen:camera.rgen.spv:main,spec.3=0.5 "
-                                 "--stage=light=rgen:camera.rgen,spec.3=2 sky.rmiss");
+    const auto json = reflection(
+        "--stage dark=rgen:camera.rgen.spv:main,spec.3=0.5 "
+        "--stage=light=rgen:camera.rgen,spec.3=2 sky.rmiss");
     EXPECT_EQ(json["stages"][0]["name"], "dark");
     EXPECT_EQ(json["stages"][1]["name"], "light");
     EXPECT_EQ(json["groups"][0]["name"], "dark");
@@ -169,8 +173,9 @@ TEST_F(Stages, StageMistakes) {
 }
 
 TEST_F(Stages, HitGroupsMayNameStages) {
-    EXPECT_THAT(groups("camera.rgen sky.rmiss --stage glass=rchit:shade.rchit --hit-group g=glass,cutout.rahit"),
-                ElementsAre("general camera.rgen", "general sky.rmiss", "triangles g"));
+    EXPECT_THAT(
+        groups("camera.rgen sky.rmiss --stage glass=rchit:shade.rchit --hit-group g=glass,cutout.rahit"),
+        ElementsAre("general camera.rgen", "general sky.rmiss", "triangles g"));
 }
 
 TEST_F(Stages, FilesOfOneNameInTwoFoldersAreTwoStages) {

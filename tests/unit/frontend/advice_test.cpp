@@ -10,7 +10,8 @@ using ::testing::HasSubstr;
 namespace {
 
 // Every message of compiling `body` behind the NV head, joined.
-std::string messages(const std::string& body, const std::string& head = "#extension GL_NV_ray_tracing : require\n") {
+std::string messages(const std::string& body,
+                     const std::string& head = "#extension GL_NV_ray_tracing : require\n") {
     const rtc::FrontendResult result =
         rtc::compile_glsl({rtc::StageKind::ClosestHit, "a.rchit", "#version 460\n" + head + body}, {});
     EXPECT_FALSE(result.ok);
@@ -30,10 +31,12 @@ TEST(Advice, OldSpellings) {
         {"gl_ObjectToWorld3x4NV[0].x", "gl_ObjectToWorldNV only; transpose it"},
     };
     for (const auto& [expression, advice] : cases)
-        EXPECT_THAT(messages("void main() { float x = float(" + std::string(expression) + "); }\n"), HasSubstr(advice))
+        EXPECT_THAT(messages("void main() { float x = float(" + std::string(expression) + "); }\n"),
+                    HasSubstr(advice))
             << expression;
     EXPECT_THAT(messages("void main() { traceNVX(); }\n"), HasSubstr("write traceNV"));
-    EXPECT_THAT(messages("intersectionAttributesNV vec2 a;\nvoid main() {}\n"), HasSubstr("write hitAttributeNV"));
+    EXPECT_THAT(messages("intersectionAttributesNV vec2 a;\nvoid main() {}\n"),
+                HasSubstr("write hitAttributeNV"));
 }
 
 TEST(Advice, MissingUniform) {
@@ -62,11 +65,12 @@ TEST(Advice, MissingExtensions) {
 }
 
 TEST(Advice, PositionFetchHasAnIdOfItsOwn) {
-    const rtc::FrontendResult result = rtc::compile_glsl(
-        {rtc::StageKind::ClosestHit, "a.rchit",
-         "#version 460\n#extension GL_EXT_ray_tracing : require\n"
-         "#extension GL_EXT_ray_tracing_position_fetch : require\n"
-         "void main() { vec3 p = gl_HitTriangleVertexPositionsEXT[0]; }\n"}, {});
+    const rtc::FrontendResult result =
+        rtc::compile_glsl({rtc::StageKind::ClosestHit, "a.rchit",
+                           "#version 460\n#extension GL_EXT_ray_tracing : require\n"
+                           "#extension GL_EXT_ray_tracing_position_fetch : require\n"
+                           "void main() { vec3 p = gl_HitTriangleVertexPositionsEXT[0]; }\n"},
+                          {});
     ASSERT_FALSE(result.diagnostics.empty());
     EXPECT_EQ(result.diagnostics[0].id, "position-fetch-glsl");
 }

@@ -32,12 +32,16 @@ constexpr uint32_t kVersion13 = 0x10300, kVersion14 = 0x10400;
 TEST(Glsl, EveryStageOfBothDialectsCompiles) {
     for (const char* dialect : {"nv", "ext"}) {
         int stages = 0;
-        for (const auto& entry : std::filesystem::directory_iterator(std::string(RTC_SHADERS) + "/cli/" + dialect)) {
+        for (const auto& entry :
+             std::filesystem::directory_iterator(std::string(RTC_SHADERS) + "/cli/" + dialect)) {
             const std::string path = entry.path().string();
             if (!rtc::stage_kind_from_file(path)) continue;
             std::ifstream stream(path, std::ios::binary);
             const rtc::FrontendResult result = rtc::compile_glsl(
-                {std::nullopt, path, {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()}}, {});
+                {std::nullopt,
+                 path,
+                 {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()}},
+                {});
             EXPECT_TRUE(result.ok) << path << "\n" << errors_of(result);
             ASSERT_GT(result.spirv.size(), 5u);
             EXPECT_EQ(result.spirv[1], dialect[0] == 'n' ? kVersion13 : kVersion14) << path;
@@ -64,8 +68,9 @@ TEST(Glsl, BothDialectsNamedAreChosenByThePreprocessor) {
 }
 
 TEST(Glsl, DebugInfoHasLinesAndNamesAsGiven) {
-    const std::string source = "#version 460\n#extension GL_NV_ray_tracing : require\n"
-                               "layout(location = 0) rayPayloadInNV vec4 color;\nvoid main() {\n    color = vec4(0.0);\n}\n";
+    const std::string source =
+        "#version 460\n#extension GL_NV_ray_tracing : require\n"
+        "layout(location = 0) rayPayloadInNV vec4 color;\nvoid main() {\n    color = vec4(0.0);\n}\n";
     rtc::FrontendOptions options;
     rtc::FrontendResult result = rtc::compile_glsl({std::nullopt, "dir/a.rmiss", source}, options);
     EXPECT_THAT(text_of(result), HasSubstr("OpString \"dir/a.rmiss\""));
@@ -98,12 +103,14 @@ TEST(Glsl, MistakesInTheHeadKeepTheirLine) {
 TEST(Glsl, IncludesAreListedOnce) {
     rtc::FrontendOptions options;
     options.include = [](const rtc::IncludeRequest& request) {
-        return rtc::IncludeAnswer{true, "lib/" + request.name, "#ifndef G\n#define G\nint g() { return 1; }\n#endif\n"};
+        return rtc::IncludeAnswer{true, "lib/" + request.name,
+                                  "#ifndef G\n#define G\nint g() { return 1; }\n#endif\n"};
     };
-    const rtc::FrontendResult result = rtc::compile_glsl(
-        {rtc::StageKind::Miss, "a",
-         "#version 460\n#extension GL_NV_ray_tracing : require\n#include \"x\"\n#include <x>\nvoid main() { g(); }\n"},
-        options);
+    const rtc::FrontendResult result =
+        rtc::compile_glsl({rtc::StageKind::Miss, "a",
+                           "#version 460\n#extension GL_NV_ray_tracing : require\n#include \"x\"\n#include "
+                           "<x>\nvoid main() { g(); }\n"},
+                          options);
     EXPECT_TRUE(result.ok) << errors_of(result);
     EXPECT_THAT(result.dependencies, ElementsAre("a", "lib/x"));
 }
@@ -159,17 +166,18 @@ TEST(Glsl, ThePrintedSeedShadersSayWhatToWrite) {
                                "declare it writeonly", "end it with `};`", "write gl_LaunchIDNV"})
         EXPECT_THAT(raygen, HasSubstr(advice));
     const std::string hit = errors("closesthit.rchit");
-    for (const char* advice : {"#version 460", "#extension GL_NV_ray_tracing : require", "end it with `};`",
-                               "write gl_HitTNV"})
+    for (const char* advice :
+         {"#version 460", "#extension GL_NV_ray_tracing : require", "end it with `};`", "write gl_HitTNV"})
         EXPECT_THAT(hit, HasSubstr(advice));
 }
 
 TEST(Glsl, BlockNamesUsedAsVariablesAreExplained) {
-    const rtc::FrontendResult result = rtc::compile_glsl(
-        {rtc::StageKind::RayGen, "a.rgen",
-         "#version 460\n#extension GL_NV_ray_tracing : require\n"
-         "layout(location = 1) rayPayloadNV primaryPayload {\n    vec4 color;\n};\n"
-         "void main() {\n    primaryPayload.color = vec4(0.0);\n}\n"}, {});
+    const rtc::FrontendResult result =
+        rtc::compile_glsl({rtc::StageKind::RayGen, "a.rgen",
+                           "#version 460\n#extension GL_NV_ray_tracing : require\n"
+                           "layout(location = 1) rayPayloadNV primaryPayload {\n    vec4 color;\n};\n"
+                           "void main() {\n    primaryPayload.color = vec4(0.0);\n}\n"},
+                          {});
     ASSERT_EQ(result.diagnostics.size(), 1u);
     EXPECT_EQ(result.diagnostics[0].line, 7u);
     EXPECT_THAT(result.diagnostics[0].text, HasSubstr("give the block an instance"));

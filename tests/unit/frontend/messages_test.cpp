@@ -39,15 +39,17 @@ TEST(Messages, WithoutAPositionBelongToTheFile) {
 TEST(Messages, SummariesAreDropped) {
     EXPECT_TRUE(parsed("ERROR: 3 compilation errors.  No code generated.\n\n"
                        "ERROR: a:3: '' : compilation terminated \nmain.rgen\n"
-                       "SPIR-V is not generated for failed compile or link\n").empty());
+                       "SPIR-V is not generated for failed compile or link\n")
+                    .empty());
 }
 
 TEST(Messages, ConsequencesAreDropped) {
-    const auto out = parsed("ERROR: a:3: 'q' : undeclared identifier\n"
-                            "ERROR: a:3: 'xyz' : vector swizzle too long\n"
-                            "ERROR: a:3: '=' :  cannot convert from 'float' to 'int'\n"
-                            "ERROR: a:4: 'xyz' : vector swizzle selection out of range\n"
-                            "ERROR: a:5: '=' :  cannot convert from 'float' to 'int'\n");
+    const auto out = parsed(
+        "ERROR: a:3: 'q' : undeclared identifier\n"
+        "ERROR: a:3: 'xyz' : vector swizzle too long\n"
+        "ERROR: a:3: '=' :  cannot convert from 'float' to 'int'\n"
+        "ERROR: a:4: 'xyz' : vector swizzle selection out of range\n"
+        "ERROR: a:5: '=' :  cannot convert from 'float' to 'int'\n");
     ASSERT_EQ(out.size(), 2u);
     EXPECT_EQ(out[1].line, 5u);
     EXPECT_EQ(out[1].text, "'=' : cannot convert from 'float' to 'int'");
@@ -59,8 +61,12 @@ TEST(Messages, TheSameMessageTwiceIsOne) {
 
 TEST(Messages, AMissingEntryPointIsAnEchoOfOtherErrors) {
     EXPECT_EQ(parsed("ERROR: a:3: '' : syntax error\n"
-                     "ERROR: Linking miss stage: Missing entry point: Each stage requires one entry point\n").size(), 1u);
-    EXPECT_EQ(parsed("ERROR: Linking miss stage: Missing entry point: Each stage requires one entry point\n").size(), 1u);
+                     "ERROR: Linking miss stage: Missing entry point: Each stage requires one entry point\n")
+                  .size(),
+              1u);
+    EXPECT_EQ(parsed("ERROR: Linking miss stage: Missing entry point: Each stage requires one entry point\n")
+                  .size(),
+              1u);
 }
 
 TEST(Messages, OddTextIsKept) {

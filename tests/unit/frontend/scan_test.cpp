@@ -29,8 +29,8 @@ TEST(Scan, FindsTheVersion) {
 }
 
 TEST(Scan, FindsStagePragmas) {
-    const rtc::SourceFacts facts =
-        rtc::scan_source("#version 460\n#pragma shader_stage(miss)\n#pragma shader_stage ( raygen )\n#pragma once\n");
+    const rtc::SourceFacts facts = rtc::scan_source(
+        "#version 460\n#pragma shader_stage(miss)\n#pragma shader_stage ( raygen )\n#pragma once\n");
     ASSERT_EQ(facts.stage_pragmas.size(), 2u);
     EXPECT_EQ(facts.stage_pragmas[0].name, "miss");
     EXPECT_EQ(facts.stage_pragmas[0].line, 2u);

@@ -81,11 +81,13 @@ TEST(SpirvInfo, DamageIsNamed) {
 }
 
 TEST(SpirvInfo, AnEntryPointNameThatNeverEnds) {
-    std::vector<uint32_t> words = {0x07230203, 0x10300, 0, 10, 0, 5u << 16 | 15, 5313, 1, 0x61616161, 0x61616161};
+    std::vector<uint32_t> words = {0x07230203,    0x10300, 0, 10,         0,
+                                   5u << 16 | 15, 5313,    1, 0x61616161, 0x61616161};
     EXPECT_NE(rtc::inspect_spirv(words).error, "");
 }
 
-uint64_t value(rtc::SpecConstantInfo::Type type, uint32_t width, const std::string& text, bool expect_ok = true) {
+uint64_t value(rtc::SpecConstantInfo::Type type, uint32_t width, const std::string& text,
+               bool expect_ok = true) {
     rtc::SpecConstantInfo constant;
     constant.type = type;
     constant.width = width;

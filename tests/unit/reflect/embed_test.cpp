@@ -74,7 +74,8 @@ TEST(Embed, HeaderAndGroupsStandBeforeTheJson) {
     const std::string prefix = "\"rtc.reflection:0/1:";
     const size_t begin = text.find(prefix);
     ASSERT_NE(begin, std::string::npos);
-    const std::string base64 = text.substr(begin + prefix.size(), text.find('"', begin + 1) - begin - prefix.size());
+    const std::string base64 =
+        text.substr(begin + prefix.size(), text.find('"', begin + 1) - begin - prefix.size());
     // 24 header words: their first three as base64 decode to "RTMF", the version and the flags.
     EXPECT_EQ(base64.substr(0, 16), "UlRNRgEAAAABAAAA");
     EXPECT_EQ(sizeof(RtcModuleHeader), 96u);

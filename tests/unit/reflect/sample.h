@@ -60,6 +60,7 @@ inline std::vector<uint32_t> sample_module() {
                      %main = OpFunction %void None %fn
                      %label = OpLabel
                      OpReturn
-                     OpFunctionEnd)", &words);
+                     OpFunctionEnd)",
+                  &words);
     return words;
 }
