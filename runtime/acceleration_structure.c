@@ -1,5 +1,5 @@
 /* Acceleration structure objects: what they hold, how large they are, where they lie. */
-#include "internal.h"
+#include "build.h"
 
 #define MAX_PRIMITIVES (1u << 26)
 #define MAX_INSTANCES (1u << 24)
@@ -8,16 +8,50 @@ static VkResult bad(RtrDevice d, const char* id, const char* text, unsigned geom
     return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, id, "acceleration structure, geometry %u: %s", geometry, text);
 }
 
+bool rtr_vertex_format(VkFormat format, uint32_t* code, uint32_t* bytes, uint32_t* component_bytes) {
+    uint32_t components = 3;
+    *component_bytes = 2;
+    switch (format) {
+        case VK_FORMAT_R32G32B32_SFLOAT:
+        case VK_FORMAT_R32G32B32A32_SFLOAT:
+            *code = RTR_VERTEX_FLOAT3;
+            *component_bytes = 4;
+            break;
+        case VK_FORMAT_R32G32_SFLOAT:
+            *code = RTR_VERTEX_FLOAT2;
+            *component_bytes = 4;
+            components = 2;
+            break;
+        case VK_FORMAT_R16G16B16_SFLOAT:
+        case VK_FORMAT_R16G16B16A16_SFLOAT: *code = RTR_VERTEX_HALF3; break;
+        case VK_FORMAT_R16G16_SFLOAT:
+            *code = RTR_VERTEX_HALF2;
+            components = 2;
+            break;
+        case VK_FORMAT_R16G16B16_SNORM:
+        case VK_FORMAT_R16G16B16A16_SNORM: *code = RTR_VERTEX_SNORM3; break;
+        case VK_FORMAT_R16G16_SNORM:
+            *code = RTR_VERTEX_SNORM2;
+            components = 2;
+            break;
+        default: return false;
+    }
+    *bytes = components * *component_bytes;
+    return true;
+}
+
 static VkResult check_triangles(RtrDevice d, const VkGeometryTrianglesNV* t, unsigned g, uint32_t* primitives) {
+    uint32_t code, bytes, component;
     if (t->pNext) return bad(d, "pNext", "VkGeometryTrianglesNV::pNext must be NULL", g);
-    if (t->vertexFormat != VK_FORMAT_R32G32B32_SFLOAT && t->vertexFormat != VK_FORMAT_R32G32B32A32_SFLOAT)
+    if (!rtr_vertex_format(t->vertexFormat, &code, &bytes, &component))
         return rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "vertex-format",
-                         "acceleration structure, geometry %u: vertex format %d is not supported; use "
-                         "VK_FORMAT_R32G32B32_SFLOAT",
+                         "acceleration structure, geometry %u: vertex format %d; VK_NV_ray_tracing lists R32G32B32_SFLOAT, "
+                         "R32G32_SFLOAT, R16G16B16_SFLOAT, R16G16_SFLOAT, R16G16_SNORM, R16G16B16_SNORM",
                          g, (int)t->vertexFormat);
-    if (t->vertexStride % 4 != 0 || (t->vertexStride < 12 && t->vertexCount > 1))
-        return bad(d, "vertex-stride", "vertexStride must be a multiple of 4 and at least 12", g);
-    if (t->vertexOffset % 4 != 0) return bad(d, "vertex-offset", "vertexOffset must be a multiple of 4", g);
+    if (t->vertexStride % component != 0 || (t->vertexStride < bytes && t->vertexCount > 1))
+        return bad(d, "vertex-stride", "vertexStride must be a multiple of the component size and hold a vertex", g);
+    if (t->vertexOffset % component != 0)
+        return bad(d, "vertex-offset", "vertexOffset must be a multiple of the component size", g);
     switch (t->indexType) {
         case VK_INDEX_TYPE_NONE_NV:
             if (t->indexCount != 0) return bad(d, "index-count", "indexCount must be 0 with VK_INDEX_TYPE_NONE_NV", g);

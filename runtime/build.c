@@ -260,6 +260,7 @@ VkResult rtrCmdBuildAccelerationStructure(RtrRecorder recorder, const VkAccelera
     b.push.self_lo = (uint32_t)rtr_as_base(dst);
     b.push.self_hi = (uint32_t)(rtr_as_base(dst) >> 32);
     b.push.slots_quad = b.slots_quad;
+    b.push.heap_quads = (uint32_t)(dst->heap->size / RTC_QUAD_BYTES);
     b.push.slot_quads = rtr_slot_quads(dst);
     b.push.build_flags = info->flags;
     b.push.geometry_count = info->geometryCount;

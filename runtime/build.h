@@ -25,6 +25,9 @@ typedef struct RtrBuild {
 
 VkResult rtr_check_geometry(RtrDevice d, const VkGeometryNV* g, unsigned index, uint32_t* primitives);
 
+/* How a vertex format is read; false when the extension does not list it. */
+bool rtr_vertex_format(VkFormat format, uint32_t* code, uint32_t* bytes, uint32_t* component_bytes);
+
 /* Set 1 with node window `nodes_at` and slot window `slots_at` (first node, first slot);
  * arrays of size 0 in the layout are left out. */
 VkResult rtr_bind_arrays(RtrBuild* b, uint32_t nodes_at, uint32_t slots_at);

@@ -71,7 +71,9 @@ static VkResult triangles(RtrBuild* b, uint32_t g, uint32_t first, uint32_t coun
     const VkDeviceSize limit = b->device->limits.maxStorageBufferRange - 1024u;
     const bool indexed = t->indexType != VK_INDEX_TYPE_NONE_NV;
     const VkDeviceSize index_size = t->indexType == VK_INDEX_TYPE_UINT16 ? 2 : 4;
-    const VkDeviceSize vertex_bytes = t->vertexCount ? (t->vertexCount - 1) * t->vertexStride + 12 : 0;
+    uint32_t code = 0, size = 12, component = 4;
+    const bool known = rtr_vertex_format(t->vertexFormat, &code, &size, &component);
+    const VkDeviceSize vertex_bytes = known && t->vertexCount ? (t->vertexCount - 1) * t->vertexStride + size : 0;
     VkDeviceSize bytes_each = indexed ? 3 * index_size : 3 * t->vertexStride;
     uint32_t chunk = bytes_each ? (uint32_t)rtr_min_size(limit / bytes_each, count) : count;
     uint32_t at;
@@ -93,7 +95,7 @@ static VkResult triangles(RtrBuild* b, uint32_t g, uint32_t first, uint32_t coun
             b->push.index_type = t->indexType == VK_INDEX_TYPE_UINT16 ? RTR_INDEX_16 : RTR_INDEX_32;
         } else {
             VkDeviceSize begin = t->vertexOffset + at * bytes_each;
-            data = window(t->vertexData, begin, begin + (3 * n - 1) * t->vertexStride + 12, &b->push.data_offset);
+            data = window(t->vertexData, begin, begin + (3 * n - 1) * t->vertexStride + size, &b->push.data_offset);
             b->push.vertex_count = 3 * n;
             b->push.index_type = RTR_INDEX_NONE;
         }
@@ -106,6 +108,7 @@ static VkResult triangles(RtrBuild* b, uint32_t g, uint32_t first, uint32_t coun
         b->push.primitive_base = at;
         b->push.geometry = slot_flags(&b->geometries[g], g);
         b->push.data_stride = (uint32_t)t->vertexStride;
+        b->push.vertex_format = code;
         if ((r = bind_inputs(b, data, index, transform)) != VK_SUCCESS || (r = emit(b)) != VK_SUCCESS) return r;
     }
     return VK_SUCCESS;

@@ -182,8 +182,8 @@ RTR_API VkDescriptorType rtrTranslateDescriptorType(VkDescriptorType type);
      VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT)
 /* Buffer usages of build and update scratch. */
 #define RTR_SCRATCH_BUFFER_USAGE (VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT)
-/* Vertex, index, transform, AABB and instance buffers, and SBT buffers. Index data
- * of 16 bits is read by whole words: pad such a buffer to a multiple of 4 bytes. */
+/* Vertex, index, transform, AABB and instance buffers, and SBT buffers. Indices and vertex
+ * components of 16 bits are read by whole words: pad such a buffer to a multiple of 4 bytes. */
 #define RTR_INPUT_BUFFER_USAGE VK_BUFFER_USAGE_STORAGE_BUFFER_BIT
 /* Buffer usages of a recorder's control region. */
 #define RTR_CONTROL_BUFFER_USAGE                                               \
@@ -224,9 +224,10 @@ RTR_API void rtrFreeHeapRange(RtrHeap heap, VkDeviceSize offset);
 /* Counterpart: vkCreateAccelerationStructureNV. With compactedSize != 0 the object is
  * the target of a compacting copy or of a clone and info's counts are 0. Geometry
  * structures are copied; buffers named in them are only used by the build.
- * Limits: 2^26 primitives, 2^24 instances, 2^24-1 geometries; vertex format
- * VK_FORMAT_R32G32B32_SFLOAT; index types NONE_NV, UINT16, UINT32. One kind of
- * geometry per bottom level.
+ * Limits: 2^26 primitives, 2^24 instances, 2^24-1 geometries; vertex formats
+ * R32G32B32 and R32G32 SFLOAT, R16G16B16 and R16G16 SFLOAT and SNORM (also with an
+ * alpha that is ignored; a missing z is 0); index types NONE_NV, UINT16, UINT32. One
+ * kind of geometry per bottom level.
  * Errors: VALIDATION_FAILED for counts, formats, mixed geometry types, unknown pNext. */
 RTR_API VkResult rtrCreateAccelerationStructure(RtrDevice device, const VkAccelerationStructureCreateInfoNV* pCreateInfo,
                                                 const VkAllocationCallbacks* pAllocator,

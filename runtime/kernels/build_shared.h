@@ -64,6 +64,14 @@
 #define RTR_INDEX_16 1u
 #define RTR_INDEX_32 2u
 
+/* Two or three components; a missing z is 0. */
+#define RTR_VERTEX_FLOAT3 0u
+#define RTR_VERTEX_FLOAT2 1u
+#define RTR_VERTEX_HALF3 2u
+#define RTR_VERTEX_HALF2 3u
+#define RTR_VERTEX_SNORM3 4u
+#define RTR_VERTEX_SNORM2 5u
+
 #define RTR_BUILD_TOP 1u
 #define RTR_BUILD_AABBS 2u
 #define RTR_BUILD_KEEP_DEGENERATE 4u /* ALLOW_UPDATE: only NaN drops a primitive */
@@ -95,7 +103,9 @@ struct RtrBuildPush {
     RTR_UINT slot_quads;     /* quads of a slot */
     RTR_UINT src_lo;         /* copy and refit: base of the source */
     RTR_UINT src_hi;
-    RTR_UINT pad[3];
+    RTR_UINT heap_quads;     /* size of the heap: instance references are checked against it */
+    RTR_UINT vertex_format;  /* RTR_VERTEX_* */
+    RTR_UINT pad;
 };
 
 #endif /* RTR_BUILD_SHARED_H_ */

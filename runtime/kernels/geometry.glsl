@@ -8,11 +8,25 @@ uint read_index(uint i) {
     return (in_index[byte >> 2] >> (8u * (byte & 2u))) & 0xffffu;
 }
 
+uint read_16(uint byte) { return (in_data[byte >> 2] >> (8u * (byte & 2u))) & 0xffffu; }
+
+vec3 decode_vertex(uint byte) {
+    if (p.vertex_format <= RTR_VERTEX_FLOAT2) {
+        uint w = byte >> 2;
+        float z = p.vertex_format == RTR_VERTEX_FLOAT3 ? uintBitsToFloat(in_data[w + 2u]) : 0.0;
+        return vec3(uintBitsToFloat(in_data[w]), uintBitsToFloat(in_data[w + 1u]), z);
+    }
+    uint xy = read_16(byte) | (read_16(byte + 2u) << 16);
+    bool has_z = p.vertex_format == RTR_VERTEX_HALF3 || p.vertex_format == RTR_VERTEX_SNORM3;
+    uint z = has_z ? read_16(byte + 4u) : 0u;
+    if (p.vertex_format <= RTR_VERTEX_HALF2) return vec3(unpackHalf2x16(xy), unpackHalf2x16(z).x);
+    return vec3(unpackSnorm2x16(xy), unpackSnorm2x16(z).x);
+}
+
 vec3 read_vertex(uint index) {
     // An index beyond the vertex count is the application's error; never read outside.
     index = min(index, p.vertex_count - 1u);
-    uint w = (p.data_offset + index * p.data_stride) >> 2;
-    vec3 v = vec3(uintBitsToFloat(in_data[w]), uintBitsToFloat(in_data[w + 1u]), uintBitsToFloat(in_data[w + 2u]));
+    vec3 v = decode_vertex(p.data_offset + index * p.data_stride);
     if ((p.flags & RTR_BUILD_HAS_TRANSFORM) == 0u) return v;
     uint t = p.transform_offset >> 2;
     precise vec3 r;

@@ -117,6 +117,13 @@ void main() {
         uint base_lo = in_data[at + 14u];
         uint base_hi = in_data[at + 15u];
         active_ = (base_lo | base_hi) != 0u;
+        // A reference to nothing that was built here is never followed; the header's first
+        // offender tells which instance it was.
+        if (active_ && (base_hi != 0u || base_lo > p.heap_quads - RTC_AS_HEADER_QUADS ||
+                        heap_quad(base_lo, base_hi, RTC_HDR_MAGIC / 4u).z != RTC_AS_MAGIC)) {
+            active_ = false;
+            atomicMin(state[RTR_ST_OFFENDER], p.first + i);
+        }
         for (uint r = 0u; r < 3u; r++) active_ = active_ && !any_nan(m[r].xyz) && !is_nan(m[r].w);
 
         uint facts = 0u, slots = 0u, nodes = 0u;

@@ -258,6 +258,65 @@ TEST_P(BuildTest, GeometryFields) {
     EXPECT_EQ(seen[2], 99);
 }
 
+TEST_P(BuildTest, VertexFormats) {
+    // 0x3c00 is 1.0 and 0xc000 -2.0 as half; SNORM 32767 is 1, -32767 is -1.
+    struct Case {
+        VkFormat format;
+        int components;
+        bool half, wide;
+    };
+    for (Case c : {Case{VK_FORMAT_R32G32_SFLOAT, 2, false, true}, Case{VK_FORMAT_R16G16B16_SFLOAT, 3, true, false},
+                   Case{VK_FORMAT_R16G16_SFLOAT, 2, true, false}, Case{VK_FORMAT_R16G16B16_SNORM, 3, false, false},
+                   Case{VK_FORMAT_R16G16_SNORM, 2, false, false}, Case{VK_FORMAT_R16G16B16A16_SFLOAT, 3, true, false}}) {
+        SCOPED_TRACE(c.format);
+        Scene scene(*vk, rtr, 1 << 16);
+        const float values[3][3] = {{1, 0, -1}, {0, 1, 1}, {-1, -1, 0}};
+        const uint32_t stride = c.wide ? 12 : 10;
+        std::vector<unsigned char> raw(2 * 2 + 3 * stride + 2);
+        for (uint32_t v = 0; v < 3; v++) {
+            for (int k = 0; k < c.components; k++) {
+                float f = values[v][k];
+                if (c.wide) {
+                    memcpy(&raw[4 + v * stride + 4 * k], &f, 4);
+                } else {
+                    uint16_t h = c.half ? (f == 1 ? 0x3c00 : f == -1 ? 0xbc00 : 0) : static_cast<uint16_t>(int16_t(f * 32767));
+                    memcpy(&raw[2 + v * stride + 2 * k], &h, 2);
+                }
+            }
+        }
+        VkGeometryNV g = scene.triangles({});
+        auto& t = g.geometry.triangles;
+        t.vertexData = scene.upload(raw.data(), raw.size()).handle;
+        t.vertexOffset = c.wide ? 4 : 2;
+        t.vertexStride = stride;
+        t.vertexCount = 3;
+        t.vertexFormat = c.format;
+        auto as = scene.build_bottom({g}, flags());
+        TreeFacts facts;
+        check_structure(scene, as, facts);
+        ASSERT_EQ(facts.slots.size(), 1u);
+        for (int v = 0; v < 3; v++) {
+            EXPECT_EQ(facts.slots[0].v[v].x, values[v][0]);
+            EXPECT_EQ(facts.slots[0].v[v].y, values[v][1]);
+            EXPECT_EQ(facts.slots[0].v[v].z, c.components == 3 ? values[v][2] : 0.0f);
+        }
+    }
+}
+
+TEST_P(BuildTest, BadReferencesAreNeverFollowed) {
+    Scene scene(*vk, rtr, 1 << 16);
+    auto leaf = scene.build_bottom({scene.triangles(soup(5, 1))}, flags());
+    std::vector<VkAccelerationStructureInstanceNV> list(4, scene.instance(leaf));
+    list[1].accelerationStructureReference += 1;         // inside something
+    list[2].accelerationStructureReference = 1u << 30;   // beyond the heap
+    list[3].accelerationStructureReference = 1ull << 40;
+    auto as = scene.build_top(list, flags());
+    TreeFacts facts;
+    check_structure(scene, as, facts);
+    EXPECT_EQ(scene.words(as)[RTC_HDR_ACTIVE_COUNT], 1u);
+    EXPECT_EQ(scene.words(as)[RTC_HDR_FIRST_OFFENDER], 0u);  // not opaque, itself
+}
+
 TEST_P(BuildTest, Boxes) {
     Scene scene(*vk, rtr, 1 << 20);
     std::vector<std::array<float, 6>> boxes;
