@@ -12,8 +12,8 @@ namespace {
 constexpr uint32_t kNone = 0xffffffffu;
 
 struct Probe {
-    uint32_t inside, lane, x, y, z, width, miss, hit, callable, miss_word, hit_word, callable_word, raygen_word, loaded,
-        scratch, unused;
+    uint32_t inside, lane, x, y, z, width, miss, hit, callable, miss_word, hit_word, callable_word,
+        raygen_word, loaded, scratch, unused;
 };
 
 struct Launch {
@@ -43,7 +43,8 @@ std::vector<Probe> probe(const std::vector<uint32_t>& params, const std::vector<
 }
 
 TEST_F(LabTest, LanesCoverTheGridOnce) {
-    for (const Launch& shape : {Launch{1, 1, 1}, Launch{8, 4, 1}, Launch{13, 7, 1}, Launch{33, 2, 3}, Launch{5, 9, 4}}) {
+    for (const Launch& shape :
+         {Launch{1, 1, 1}, Launch{8, 4, 1}, Launch{13, 7, 1}, Launch{33, 2, 3}, Launch{5, 9, 4}}) {
         for (uint32_t flags : {0u, uint32_t(RTC_LAUNCH_TILE_8X4)}) {
             Launch launch = shape;
             launch.flags = flags;
@@ -56,7 +57,8 @@ TEST_F(LabTest, LanesCoverTheGridOnce) {
                 launch.lane_base = part ? half : 0;
                 launch.lane_count = part ? lanes - half : half;
                 if (launch.lane_count == 0) continue;
-                const auto probes = probe(parameters(launch), {0, 0}, std::vector<uint32_t>(launch.lane_count));
+                const auto probes =
+                    probe(parameters(launch), {0, 0}, std::vector<uint32_t>(launch.lane_count));
                 for (uint32_t i = 0; i < probes.size(); ++i) {
                     const Probe& p = probes[i];
                     EXPECT_EQ(p.lane, launch.lane_base + i);
@@ -81,7 +83,8 @@ TEST_F(LabTest, LanesCoverTheGridOnce) {
             Launch launch = empty;
             launch.flags = flags;
             launch.lane_count = 64;
-            for (const Probe& p : probe(parameters(launch), {0, 0}, std::vector<uint32_t>(64))) EXPECT_EQ(p.inside, 0u);
+            for (const Probe& p : probe(parameters(launch), {0, 0}, std::vector<uint32_t>(64)))
+                EXPECT_EQ(p.inside, 0u);
         }
     }
 }
@@ -101,7 +104,8 @@ TEST_F(LabTest, RecordsStayInTheirRegions) {
     params[RTC_PARAM_CALLABLE_OFFSET] = 4096;
     params[RTC_PARAM_CALLABLE_SIZE] = 32;
     params[RTC_PARAM_CALLABLE_STRIDE] = 0;  // every index is the one record
-    const std::vector<uint32_t> indices = {0, 1, 2, 3, 4, 5, 0x04000000u, 0x10000000u, 0x7fffffffu, 0xffffffffu};
+    const std::vector<uint32_t> indices = {0, 1,           2,           3,           4,
+                                           5, 0x04000000u, 0x10000000u, 0x7fffffffu, 0xffffffffu};
     auto probes = probe(params, sbt, indices);
     for (size_t i = 0; i < indices.size(); ++i) {
         const uint32_t index = indices[i];

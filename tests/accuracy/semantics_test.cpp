@@ -51,8 +51,8 @@ TEST_P(EachTier, ReportsEverythingAboutAHit) {
 }
 
 TEST_P(EachTier, MissLeavesTheOperand) {
-    const RayResult miss = trace_one(build_scene({triangle_blas()}, {{}}), make_ray({2, 2, 3}, {0, 0, -1}, 0.5f, 77),
-                                     GetParam());
+    const RayResult miss = trace_one(build_scene({triangle_blas()}, {{}}),
+                                     make_ray({2, 2, 3}, {0, 0, -1}, 0.5f, 77), GetParam());
     EXPECT_EQ(miss.instance, kNoInstance);
     EXPECT_EQ(miss.t, 77.0f);
 }
@@ -64,9 +64,16 @@ TEST_P(EachTier, TriangleIntervalIsOpen) {
         bool hit;
     };
     const float below = std::nextafter(2.0f, 0.0f), above = std::nextafter(2.0f, 3.0f);
-    for (const Case& c : {Case{0, 2, false}, {0, above, true}, {2, 10, false}, {below, 10, true}, {2, 2, false},
-                          {0, kInf, true}, {0, std::numeric_limits<float>::max(), true}, {3, 1, false}}) {
-        const RayResult r = trace_one(scene, make_ray({0.25f, 0.25f, 2}, {0, 0, -1}, c.tmin, c.tmax), GetParam());
+    for (const Case& c : {Case{0, 2, false},
+                          {0, above, true},
+                          {2, 10, false},
+                          {below, 10, true},
+                          {2, 2, false},
+                          {0, kInf, true},
+                          {0, std::numeric_limits<float>::max(), true},
+                          {3, 1, false}}) {
+        const RayResult r =
+            trace_one(scene, make_ray({0.25f, 0.25f, 2}, {0, 0, -1}, c.tmin, c.tmax), GetParam());
         EXPECT_EQ(r.instance != kNoInstance, c.hit) << c.tmin << " .. " << c.tmax;
     }
 }
@@ -154,14 +161,15 @@ TEST_P(EachTier, FlagsMatrix) {
     for (bool box : {false, true}) {
         for (bool geometry_opaque : {false, true}) {
             for (uint32_t flags : {0u, 1u, 2u, 3u, 4u, 5u, 6u, 7u, 8u, 10u, 11u}) {
-                const HostScene scene = build_scene({box ? box_blas(geometry_opaque) : triangle_blas(geometry_opaque)},
-                                                    {{.flags = flags}});
+                const HostScene scene = build_scene(
+                    {box ? box_blas(geometry_opaque) : triangle_blas(geometry_opaque)}, {{.flags = flags}});
                 tracer.set_scene(scene);
                 std::vector<Ray> rays;
                 for (bool down : {false, true}) {
                     for (uint32_t a : opacity) {
                         for (uint32_t b : facing) {
-                            Ray ray = make_ray({0.25f, 0.25f, down ? 2.0f : -2.0f}, {0, 0, down ? -1.0f : 1.0f});
+                            Ray ray =
+                                make_ray({0.25f, 0.25f, down ? 2.0f : -2.0f}, {0, 0, down ? -1.0f : 1.0f});
                             ray.flags = a | b;
                             ray.report_t = 1;
                             rays.push_back(ray);
@@ -175,7 +183,8 @@ TEST_P(EachTier, FlagsMatrix) {
                     const Expected e = rules(box, geometry_opaque, front, flags, rays[i].flags);
                     const RayResult& r = results[i];
                     const std::string what = (box ? "box" : "triangle") + std::string(", instance ") +
-                                             std::to_string(flags) + ", ray " + std::to_string(rays[i].flags) +
+                                             std::to_string(flags) + ", ray " +
+                                             std::to_string(rays[i].flags) +
                                              (geometry_opaque ? ", opaque" : "") + (down ? ", down" : ", up");
                     EXPECT_EQ(r.instance != kNoInstance, e.candidate) << what;
                     EXPECT_EQ(r.boxes, box && e.candidate ? 1u : 0u) << what;
@@ -197,8 +206,8 @@ TEST_P(EachTier, FlagsMatrix) {
 TEST_P(EachTier, MirroringDoesNotFlipFacing) {
     Instance mirrored;
     mirrored.object_to_world = {{{-1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
-    const RayResult r =
-        trace_one(build_scene({triangle_blas()}, {mirrored}), make_ray({-0.25f, 0.25f, 2}, {0, 0, -1}), GetParam());
+    const RayResult r = trace_one(build_scene({triangle_blas()}, {mirrored}),
+                                  make_ray({-0.25f, 0.25f, 2}, {0, 0, -1}), GetParam());
     EXPECT_EQ(r.kind, 0xfeu);
     EXPECT_EQ(r.t, 2.0f);
 }
@@ -296,7 +305,9 @@ TEST_F(LabTest, DirectionLengthDoesNotMatter) {
 TEST_F(LabTest, EveryConfigurationFindsTheSame) {
     Blas sphere{{{make_icosphere(3).soup(), {}, false}}};
     Blas knot{{{make_torus_knot(80, 12).soup(), {}, true}}};
-    Blas boxes{{{{}, {{{-0.3f, -0.3f, -0.3f}, {0.3f, 0.3f, 0.3f}}, {{0.5f, 0.5f, 0.5f}, {0.6f, 0.9f, 0.7f}}}, true}}};
+    Blas boxes{{{{},
+                 {{{-0.3f, -0.3f, -0.3f}, {0.3f, 0.3f, 0.3f}}, {{0.5f, 0.5f, 0.5f}, {0.6f, 0.9f, 0.7f}}},
+                 true}}};
     std::vector<Instance> instances;
     std::mt19937_64 random(1);
     std::uniform_real_distribution<float> unit(-1, 1);

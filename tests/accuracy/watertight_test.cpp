@@ -56,7 +56,8 @@ TEST_P(Watertight, ClosedMeshesBalance) {
             for (Aim aim : {Aim::Interior, Aim::Edge, Aim::Vertex}) {
                 c.aim = aim;
                 const LeakCounts counts = count_leaks(tracer, c, kRays);
-                EXPECT_EQ(counts.unbalanced, 0u) << base.name << ' ' << aim_name(aim) << (inside ? " inside" : "");
+                EXPECT_EQ(counts.unbalanced, 0u)
+                    << base.name << ' ' << aim_name(aim) << (inside ? " inside" : "");
                 // Aimed rays do meet the mesh: the test sees something. (Needles thinner than an ulp of
                 // their offset are gone.)
                 if (base.name != "slivers" || place.offset == 0) {
@@ -149,7 +150,8 @@ TEST_F(LabTest, NoBoxHidesAHit) {
 // do not: contraction that treats all vertices alike only moves the edges'
 // signs. Möller-Trumbore leaks at both.)
 TEST_F(LabTest, NegativeControlLeaks) {
-    if (!test_context().features.shaderFloat64) GTEST_SKIP() << "the control computes fused operations in Float64";
+    if (!test_context().features.shaderFloat64)
+        GTEST_SKIP() << "the control computes fused operations in Float64";
     const IndexedMesh sphere = make_icosphere(4);
     LeakCase c;
     c.mesh = &sphere;
@@ -170,7 +172,8 @@ TEST_F(LabTest, NegativeControlLeaks) {
 // First hits against exact arithmetic. Watertight is not exact: a ray that
 // passes an edge by less than rounding may get the neighbour, so a difference
 // must be that close.
-void compare_with_exact(const IndexedMesh& mesh, Variant variant, uint32_t rays, double tolerance, uint64_t seed) {
+void compare_with_exact(const IndexedMesh& mesh, Variant variant, uint32_t rays, double tolerance,
+                        uint64_t seed) {
     const std::vector<Triangle> triangles = mesh.soup();
     DeviceTracer& tracer = shared_tracer(variant);
     tracer.set_scene(build_scene({Blas{{{triangles, {}, true}}}}, {{}}));
@@ -180,7 +183,8 @@ void compare_with_exact(const IndexedMesh& mesh, Variant variant, uint32_t rays,
     for (uint32_t i = 0; i < rays; ++i) {
         const Vec3 target = {1.3f * unit(random), 1.3f * unit(random), 1.3f * unit(random)};
         const Vec3 origin = {3 * unit(random), 3 * unit(random), 3 * unit(random)};
-        batch.push_back(make_ray(origin, {target.x - origin.x, target.y - origin.y, target.z - origin.z}, 0, 1e30f));
+        batch.push_back(
+            make_ray(origin, {target.x - origin.x, target.y - origin.y, target.z - origin.z}, 0, 1e30f));
     }
     const auto results = tracer.trace(batch);
     uint32_t differences = 0, hits = 0;

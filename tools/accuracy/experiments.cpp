@@ -90,7 +90,8 @@ std::vector<Placed> points_of(const std::string& axis) {
     } else if (axis == "offset") {
         for (int e = -1; e <= 8; ++e) {
             const double at = e < 0 ? 0 : std::pow(10.0, e);
-            Placed& p = add(e < 0 ? "0" : power_text(e), moved(make_icosphere(4), 1, {at, -at, at / 2}), 1, e <= 4);
+            Placed& p =
+                add(e < 0 ? "0" : power_text(e), moved(make_icosphere(4), 1, {at, -at, at / 2}), 1, e <= 4);
             p.c.centre = {float(at), float(-at), float(at / 2)};
         }
     } else if (axis == "size") {
@@ -105,11 +106,13 @@ std::vector<Placed> points_of(const std::string& axis) {
             add(power_text(e), make_slivers(256, ratio), std::max(1.1, 42 * ratio), e >= -6);
         }
     } else if (axis == "distance") {
-        for (int e = 1; e <= 8; ++e) add(power_text(e), make_icosphere(4), 1, e <= 5).c.distance = std::pow(10.0, e);
+        for (int e = 1; e <= 8; ++e)
+            add(power_text(e), make_icosphere(4), 1, e <= 5).c.distance = std::pow(10.0, e);
         // The other way round: small origins, large vertices.
         for (int e = 1; e <= 6; ++e) {
             const double at = std::pow(10.0, e);
-            add("0 to " + power_text(e), moved(make_icosphere(4), 1, {at, -at, at / 2}), 1, true).c.from_zero = true;
+            add("0 to " + power_text(e), moved(make_icosphere(4), 1, {at, -at, at / 2}), 1, true)
+                .c.from_zero = true;
         }
     } else if (axis == "transform") {
         for (const auto& [name, transform] : transforms()) {
@@ -193,7 +196,8 @@ ExactRow compare(DeviceTracer& tracer, const std::string& name, const IndexedMes
 }  // namespace
 
 const std::vector<std::string>& axis_names() {
-    static const std::vector<std::string> names = {"mesh", "offset", "size", "aspect", "distance", "transform", "zeros"};
+    static const std::vector<std::string> names = {"mesh",     "offset",    "size", "aspect",
+                                                   "distance", "transform", "zeros"};
     return names;
 }
 
@@ -208,7 +212,8 @@ void measure_axis(DeviceTracer& tracer, const std::string& axis, uint64_t rays, 
             LeakRow row{axis, point.value, point.mesh.name, aim_name(aim), point.promised, {}};
             // Half from inside where inside is known.
             // At offsets of 1e7 and more nothing lies inside a sphere of a few ulps.
-            const bool convex = point.mesh.name == "icosphere" && axis != "distance" && std::fabs(point.c.centre.x) < 5e6;
+            const bool convex =
+                point.mesh.name == "icosphere" && axis != "distance" && std::fabs(point.c.centre.x) < 5e6;
             point.c.from_inside = false;
             row.counts = count_leaks(tracer, point.c, convex ? rays / 2 : rays);
             if (convex) {
@@ -263,8 +268,10 @@ void measure_exact(DeviceTracer& tracer, uint64_t rays, std::vector<ExactRow>& r
     const IndexedMesh sphere = make_icosphere(3), knot = make_torus_knot(80, 12);
     rows.push_back(compare(tracer, "icosphere", sphere, {}, 1, rays, 11));
     rows.push_back(compare(tracer, "torus knot", knot, {}, 1.5, rays, 12));
-    rows.push_back(compare(tracer, "icosphere + 1e2", moved(sphere, 1, {100, -100, 50}), {100, -100, 50}, 1, rays, 13));
-    rows.push_back(compare(tracer, "icosphere + 1e4", moved(sphere, 1, {1e4, -1e4, 5e3}), {1e4f, -1e4f, 5e3f}, 1, rays, 14));
+    rows.push_back(
+        compare(tracer, "icosphere + 1e2", moved(sphere, 1, {100, -100, 50}), {100, -100, 50}, 1, rays, 13));
+    rows.push_back(compare(tracer, "icosphere + 1e4", moved(sphere, 1, {1e4, -1e4, 5e3}), {1e4f, -1e4f, 5e3f},
+                           1, rays, 14));
     rows.push_back(compare(tracer, "slivers 1e-4", make_slivers(256, 1e-4), {}, 0.02, rays, 15));
 }
 

@@ -27,11 +27,11 @@ struct CullRow {
 struct ExactRow {
     std::string scene;
     uint64_t rays = 0, hits = 0;
-    uint64_t missed = 0;     // exact hit, device miss
-    uint64_t invented = 0;   // device hit, exact miss
-    uint64_t wrong = 0;      // another triangle, not a tie on an edge
-    uint64_t ties = 0;       // another triangle, and exact arithmetic has the ray on an edge
-    double worst_margin = 0; // how far from an edge a difference was, in barycentric weight
+    uint64_t missed = 0;      // exact hit, device miss
+    uint64_t invented = 0;    // device hit, exact miss
+    uint64_t wrong = 0;       // another triangle, not a tie on an edge
+    uint64_t ties = 0;        // another triangle, and exact arithmetic has the ray on an edge
+    double worst_margin = 0;  // how far from an edge a difference was, in barycentric weight
     double t_p50 = 0, t_p99 = 0, t_p999 = 0, t_max = 0;  // error of t in ulps of the exact t
 };
 

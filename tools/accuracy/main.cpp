@@ -28,22 +28,24 @@ std::string markdown(const Report& report, const std::string& device) {
         out << "| workload | triangles | rays | Mrays/s | Mrays per CPU second | turns per ray |\n"
             << "|---|---|---|---|---|---|\n";
         for (const CostRow& r : report.cost) {
-            std::snprintf(line, sizeof line, "| %s | %llu | %llu | %.3f | %.3f | %.1f |\n", r.workload.c_str(),
-                          (unsigned long long)r.triangles, (unsigned long long)r.rays, r.mrays(),
-                          double(r.rays) / r.cpu_seconds / 1e6, r.turns_per_ray);
+            std::snprintf(line, sizeof line, "| %s | %llu | %llu | %.3f | %.3f | %.1f |\n",
+                          r.workload.c_str(), (unsigned long long)r.triangles, (unsigned long long)r.rays,
+                          r.mrays(), double(r.rays) / r.cpu_seconds / 1e6, r.turns_per_ray);
             out << line;
         }
         out << '\n';
     }
     if (!report.leaks.empty()) {
         out << "Leaks and double hits: rays whose entries and exits do not balance.\n\n"
-            << "| axis | value | mesh | aimed at | rays | no candidate | unbalanced | rate, 95 % bound | promised |\n"
+            << "| axis | value | mesh | aimed at | rays | no candidate | unbalanced | rate, 95 % bound | "
+               "promised |\n"
             << "|---|---|---|---|---|---|---|---|---|\n";
         for (const LeakRow& r : report.leaks) {
-            std::snprintf(line, sizeof line, "| %s | %s | %s | %s | %llu | %llu | %llu | < %.2g | %s |\n", r.axis.c_str(),
-                          r.value.c_str(), r.mesh.c_str(), r.aim.c_str(), (unsigned long long)r.counts.rays,
-                          (unsigned long long)r.counts.missed, (unsigned long long)r.counts.unbalanced, upper_bound(r.counts.unbalanced, r.counts.rays),
-                          r.must_be_zero ? "0" : "");
+            std::snprintf(line, sizeof line, "| %s | %s | %s | %s | %llu | %llu | %llu | < %.2g | %s |\n",
+                          r.axis.c_str(), r.value.c_str(), r.mesh.c_str(), r.aim.c_str(),
+                          (unsigned long long)r.counts.rays, (unsigned long long)r.counts.missed,
+                          (unsigned long long)r.counts.unbalanced,
+                          upper_bound(r.counts.unbalanced, r.counts.rays), r.must_be_zero ? "0" : "");
             out << line;
         }
         out << '\n';
@@ -60,14 +62,16 @@ std::string markdown(const Report& report, const std::string& device) {
     }
     if (!report.exact.empty()) {
         out << "First hits against exact arithmetic; t error in ulps of the exact t.\n\n"
-            << "| scene | rays | hits | missed | invented | other triangle | exact ties | farthest from an edge | "
+            << "| scene | rays | hits | missed | invented | other triangle | exact ties | farthest from an "
+               "edge | "
                "t p50 | p99 | p99.9 | max |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n";
         for (const ExactRow& r : report.exact) {
-            std::snprintf(line, sizeof line,
-                          "| %s | %llu | %llu | %llu | %llu | %llu | %llu | %.2g | %.2f | %.2f | %.2f | %.1f |\n",
-                          r.scene.c_str(), (unsigned long long)r.rays, (unsigned long long)r.hits,
-                          (unsigned long long)r.missed, (unsigned long long)r.invented, (unsigned long long)r.wrong,
-                          (unsigned long long)r.ties, r.worst_margin, r.t_p50, r.t_p99, r.t_p999, r.t_max);
+            std::snprintf(
+                line, sizeof line,
+                "| %s | %llu | %llu | %llu | %llu | %llu | %llu | %.2g | %.2f | %.2f | %.2f | %.1f |\n",
+                r.scene.c_str(), (unsigned long long)r.rays, (unsigned long long)r.hits,
+                (unsigned long long)r.missed, (unsigned long long)r.invented, (unsigned long long)r.wrong,
+                (unsigned long long)r.ties, r.worst_margin, r.t_p50, r.t_p99, r.t_p999, r.t_max);
             out << line;
         }
         out << '\n';
@@ -79,24 +83,41 @@ nlohmann::ordered_json to_json(const Report& report) {
     nlohmann::ordered_json json;
     json["tier"] = variant_name(report.variant);
     for (const CostRow& r : report.cost) {
-        json["cost"].push_back({{"workload", r.workload}, {"triangles", r.triangles}, {"rays", r.rays},
-                                {"mrays_per_second", r.mrays()}, {"cpu_seconds", r.cpu_seconds}, {"turns_per_ray", r.turns_per_ray}});
+        json["cost"].push_back({{"workload", r.workload},
+                                {"triangles", r.triangles},
+                                {"rays", r.rays},
+                                {"mrays_per_second", r.mrays()},
+                                {"cpu_seconds", r.cpu_seconds},
+                                {"turns_per_ray", r.turns_per_ray}});
     }
     for (const LeakRow& r : report.leaks) {
-        json["leaks"].push_back({{"axis", r.axis}, {"value", r.value}, {"mesh", r.mesh}, {"aim", r.aim},
-                                 {"rays", r.counts.rays}, {"unbalanced", r.counts.unbalanced},
+        json["leaks"].push_back({{"axis", r.axis},
+                                 {"value", r.value},
+                                 {"mesh", r.mesh},
+                                 {"aim", r.aim},
+                                 {"rays", r.counts.rays},
+                                 {"unbalanced", r.counts.unbalanced},
                                  {"missed", r.counts.missed},
                                  {"bound_95", upper_bound(r.counts.unbalanced, r.counts.rays)},
                                  {"promised_zero", r.must_be_zero}});
     }
     for (const CullRow& r : report.culls) {
-        json["culls"].push_back({{"mesh", r.mesh}, {"place", r.place}, {"rays", r.rays}, {"culled", r.culls}});
+        json["culls"].push_back(
+            {{"mesh", r.mesh}, {"place", r.place}, {"rays", r.rays}, {"culled", r.culls}});
     }
     for (const ExactRow& r : report.exact) {
-        json["exact"].push_back({{"scene", r.scene}, {"rays", r.rays}, {"hits", r.hits}, {"missed", r.missed},
-                                 {"invented", r.invented}, {"wrong", r.wrong}, {"ties", r.ties},
-                                 {"worst_margin", r.worst_margin}, {"t_ulp_p50", r.t_p50}, {"t_ulp_p99", r.t_p99},
-                                 {"t_ulp_p99_9", r.t_p999}, {"t_ulp_max", r.t_max}});
+        json["exact"].push_back({{"scene", r.scene},
+                                 {"rays", r.rays},
+                                 {"hits", r.hits},
+                                 {"missed", r.missed},
+                                 {"invented", r.invented},
+                                 {"wrong", r.wrong},
+                                 {"ties", r.ties},
+                                 {"worst_margin", r.worst_margin},
+                                 {"t_ulp_p50", r.t_p50},
+                                 {"t_ulp_p99", r.t_p99},
+                                 {"t_ulp_p99_9", r.t_p999},
+                                 {"t_ulp_max", r.t_max}});
     }
     return json;
 }
@@ -117,12 +138,15 @@ bool verdict(const Report& report) {
     }
     for (const CullRow& r : report.culls) broken += r.culls;
     if (report.variant == Variant::Watertight && broken) {
-        std::fprintf(stderr, "rtc-accuracy: error: watertight: %llu leaks, double hits or false culls where none are promised\n",
+        std::fprintf(stderr,
+                     "rtc-accuracy: error: watertight: %llu leaks, double hits or false culls where none are "
+                     "promised\n",
                      (unsigned long long)broken);
         return false;
     }
     if (report.variant == Variant::Contracted && !report.leaks.empty() && total == 0) {
-        std::fprintf(stderr, "rtc-accuracy: error: the negative control does not leak: this measurement is blind\n");
+        std::fprintf(stderr,
+                     "rtc-accuracy: error: the negative control does not leak: this measurement is blind\n");
         return false;
     }
     return true;
@@ -135,9 +159,11 @@ int run(int argc, char** argv) {
     uint64_t rays = 1 << 17, exact_rays = 0, cost_rays = 0, cull_rays = 0;
     bool validate = false, while_while = false, storage = false;
     uint32_t shared_stack = 0;
-    app.add_option("--tier", tiers, "watertight, fast, contracted (the negative control) or all")->delimiter(',');
+    app.add_option("--tier", tiers, "watertight, fast, contracted (the negative control) or all")
+        ->delimiter(',');
     app.add_option("--device", device, "device index or part of its name");
-    app.add_option("--axes", axes, "mesh, offset, size, aspect, distance, transform, zeros, all or none")->delimiter(',');
+    app.add_option("--axes", axes, "mesh, offset, size, aspect, distance, transform, zeros, all or none")
+        ->delimiter(',');
     app.add_option("--rays", rays, "rays per point and aim");
     app.add_option("--culls", cull_rays, "rays per place for false box culls");
     app.add_option("--exact", exact_rays, "rays per scene against exact arithmetic");
@@ -190,6 +216,7 @@ int run(int argc, char** argv) {
         if (exact_rays) measure_exact(tracer, exact_rays, report.exact);
         const std::string tables = markdown(report, name);
         std::fputs(tables.c_str(), stdout);
+        std::fflush(stdout);  // long runs get interrupted
         text += tables;
         json["tiers"].push_back(to_json(report));
         good = verdict(report) && good;

@@ -43,7 +43,8 @@ bool rtc_launch_begin() {
 void rtc_error(uint kind, uint detail, uint detail2) {
     uint block = rtc_param(RTC_PARAM_CONTROL_WORD);
     atomicAdd(rtc_control.w[block + RTC_CTRL_ERROR_COUNT], 1u);
-    if (atomicCompSwap(rtc_control.w[block + RTC_CTRL_ERROR], RTC_LAUNCH_ERROR_NONE, kind) == RTC_LAUNCH_ERROR_NONE) {
+    uint before = atomicCompSwap(rtc_control.w[block + RTC_CTRL_ERROR], RTC_LAUNCH_ERROR_NONE, kind);
+    if (before == RTC_LAUNCH_ERROR_NONE) {
         rtc_control.w[block + RTC_CTRL_ERROR_LANE] = rtc_launch_id.x;
         rtc_control.w[block + RTC_CTRL_ERROR_LANE + 1u] = rtc_launch_id.y;
         rtc_control.w[block + RTC_CTRL_ERROR_LANE + 2u] = rtc_launch_id.z;

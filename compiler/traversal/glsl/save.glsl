@@ -11,7 +11,8 @@ void rtc_trace_save(uint first_word) {
     rtc_scratch_store(w + 4u, rtc_ray_root);
     rtc_scratch_store(w + 5u, rtc_ray_flags);
     rtc_scratch_store(w + 6u, rtc_ray_mask);
-    rtc_scratch_store(w + 7u, (rtc_ray_sbt_offset & 15u) | (rtc_ray_sbt_stride & 15u) << 4u | rtc_ray_miss << 8u);
+    uint operands = (rtc_ray_sbt_offset & 15u) | (rtc_ray_sbt_stride & 15u) << 4u | rtc_ray_miss << 8u;
+    rtc_scratch_store(w + 7u, operands);
     rtc_scratch_store(w + 8u, floatBitsToUint(rtc_ray_origin.x));
     rtc_scratch_store(w + 9u, floatBitsToUint(rtc_ray_origin.y));
     rtc_scratch_store(w + 10u, floatBitsToUint(rtc_ray_origin.z));

@@ -134,8 +134,11 @@ uint rtc_test_triangle(uint slot) {
     float t, b1, b2;
     bool front;
     uint result = RTC_STEP_RUNNING;
-    if (rtc_triangle(uintBitsToFloat(q0.xyz), uintBitsToFloat(q1.xyz), uintBitsToFloat(q2.xyz), t, b1, b2, front) &&
-        t > rtc_trav_tmin && t < rtc_trav_tmax) {
+    vec3 v0 = uintBitsToFloat(q0.xyz);
+    vec3 v1 = uintBitsToFloat(q1.xyz);
+    vec3 v2 = uintBitsToFloat(q2.xyz);
+    if (rtc_triangle(v0, v1, v2, t, b1, b2, front) && t > rtc_trav_tmin &&
+        t < rtc_trav_tmax) {
         front = front != ((rtc_trav_bits & RTC_LEVEL_FLIP) != 0u);
         uint opacity = rtc_opacity(q1.w);
         uint cull = front ? RTC_LEVEL_CULL_FRONT : RTC_LEVEL_CULL_BACK;
@@ -237,7 +240,8 @@ uint rtc_trace_step() {
                 if (rtc_trav_cur == RTC_REF_DONE) {
                     result = RTC_STEP_DONE;
                 } else if (rtc_count(rtc_trav_cur) == 0u) {
-                    // Out of nodes. An instance goes back to the top level, whose data is made anew.
+                    // Out of nodes. An instance goes back to the top level, whose data is made
+                    // anew.
                     bool top = rtc_trav_instance == RTC_NONE;
                     rtc_trav_cur = top ? RTC_REF_DONE : RTC_REF_POP;
                     rtc_trav_instance = RTC_NONE;

@@ -97,13 +97,15 @@ DeviceTracer::DeviceTracer(const tools::Context& context, const TracerOptions& o
     VkDescriptorSetLayoutCreateInfo set_info{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO};
     set_info.bindingCount = uint32_t(bindings.size());
     set_info.pBindings = bindings.data();
-    check(vkCreateDescriptorSetLayout(context.device, &set_info, nullptr, &s.layouts[0]), "vkCreateDescriptorSetLayout");
+    check(vkCreateDescriptorSetLayout(context.device, &set_info, nullptr, &s.layouts[0]),
+          "vkCreateDescriptorSetLayout");
     const VkDescriptorSetLayoutBinding io[2] = {
         {0, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr},
         {1, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr}};
     set_info.bindingCount = 2;
     set_info.pBindings = io;
-    check(vkCreateDescriptorSetLayout(context.device, &set_info, nullptr, &s.layouts[1]), "vkCreateDescriptorSetLayout");
+    check(vkCreateDescriptorSetLayout(context.device, &set_info, nullptr, &s.layouts[1]),
+          "vkCreateDescriptorSetLayout");
     VkPipelineLayoutCreateInfo layout_info{VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO};
     layout_info.setLayoutCount = 2;
     layout_info.pSetLayouts = s.layouts.data();
@@ -114,8 +116,9 @@ DeviceTracer::DeviceTracer(const tools::Context& context, const TracerOptions& o
     module_info.codeSize = words.size() * 4;
     module_info.pCode = words.data();
     check(vkCreateShaderModule(context.device, &module_info, nullptr, &s.module), "vkCreateShaderModule");
-    const uint32_t ids[] = {RTC_SPEC_FETCH,       RTC_SPEC_WHILE_WHILE, RTC_SPEC_STEP_BUDGET, RTC_SPEC_SHARED_STACK,
-                            RTC_SPEC_BASE + 0x100, RTC_SPEC_BASE + 0x101, RTC_SPEC_BASE + 0x102, RTC_SPEC_BASE + 0x103};
+    const uint32_t ids[] = {RTC_SPEC_FETCH,        RTC_SPEC_WHILE_WHILE,  RTC_SPEC_STEP_BUDGET,
+                            RTC_SPEC_SHARED_STACK, RTC_SPEC_BASE + 0x100, RTC_SPEC_BASE + 0x101,
+                            RTC_SPEC_BASE + 0x102, RTC_SPEC_BASE + 0x103};
     const uint32_t values[] = {options.storage_fetch ? RTC_FETCH_STORAGE : RTC_FETCH_TEXEL,
                                options.while_while,
                                options.step_budget,
@@ -127,10 +130,16 @@ DeviceTracer::DeviceTracer(const tools::Context& context, const TracerOptions& o
     std::array<VkSpecializationMapEntry, std::size(ids)> entries;
     // The workgroup size stays at its default of 64.
     for (uint32_t i = 0; i < entries.size(); ++i) entries[i] = {ids[i], i * 4, 4};
-    const VkSpecializationInfo specialization{uint32_t(entries.size()), entries.data(), sizeof values, values};
+    const VkSpecializationInfo specialization{uint32_t(entries.size()), entries.data(), sizeof values,
+                                              values};
     VkComputePipelineCreateInfo info{VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO};
-    info.stage = {VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO, nullptr, 0, VK_SHADER_STAGE_COMPUTE_BIT,
-                  s.module, "main", &specialization};
+    info.stage = {VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
+                  nullptr,
+                  0,
+                  VK_SHADER_STAGE_COMPUTE_BIT,
+                  s.module,
+                  "main",
+                  &specialization};
     info.layout = s.layout;
     check(vkCreateComputePipelines(context.device, VK_NULL_HANDLE, 1, &info, nullptr, &s.pipeline),
           "vkCreateComputePipelines");
@@ -150,7 +159,8 @@ DeviceTracer::DeviceTracer(const tools::Context& context, const TracerOptions& o
     check(vkAllocateDescriptorSets(context.device, &allocate, s.sets.data()), "vkAllocateDescriptorSets");
 
     const VkBufferUsageFlags storage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
-    s.params = tools::Buffer(context, RTC_PARAM_QUADS * 16, VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT, tools::MemoryKind::Host);
+    s.params = tools::Buffer(context, RTC_PARAM_QUADS * 16, VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT,
+                             tools::MemoryKind::Host);
     s.empty = tools::Buffer(context, 16, storage, tools::MemoryKind::Host);
     s.control = tools::Buffer(context, kControlWords * 4, storage, tools::MemoryKind::Readback);
     s.write(0, RTC_BINDING_PARAMS, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, s.params);
@@ -175,8 +185,8 @@ void DeviceTracer::set_scene(const HostScene& scene) {
     State& s = *state_;
     vkDestroyBufferView(s.context.device, s.view, nullptr);
     s.view = VK_NULL_HANDLE;
-    s.heap = tools::upload_vector(s.context, scene.heap,
-                                  VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT);
+    s.heap = tools::upload_vector(
+        s.context, scene.heap, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT);
     VkBufferViewCreateInfo view_info{VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO};
     view_info.buffer = s.heap.handle;
     view_info.format = VK_FORMAT_R32G32B32A32_UINT;
@@ -208,11 +218,14 @@ std::vector<RayResult> DeviceTracer::trace(const std::vector<Ray>& rays) {
     return results;
 }
 
-std::vector<uint32_t> DeviceTracer::probe(const std::vector<uint32_t>& params, const std::vector<uint32_t>& sbt,
-                                          const std::vector<uint32_t>& indices, uint32_t groups_x, uint32_t groups_y) {
+std::vector<uint32_t> DeviceTracer::probe(const std::vector<uint32_t>& params,
+                                          const std::vector<uint32_t>& sbt,
+                                          const std::vector<uint32_t>& indices, uint32_t groups_x,
+                                          uint32_t groups_y) {
     State& s = *state_;
     set_scene({.heap = std::vector<uint32_t>(64), .root = 0, .world_to_object = {}, .max_depth = 0});
-    s.sbt = tools::Buffer(s.context, sbt.size() * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, tools::MemoryKind::Host);
+    s.sbt =
+        tools::Buffer(s.context, sbt.size() * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, tools::MemoryKind::Host);
     std::memcpy(s.sbt.mapped, sbt.data(), sbt.size() * 4);
     for (uint32_t b = RTC_BINDING_SBT_RAYGEN; b <= RTC_BINDING_SBT_CALLABLE; ++b) {
         s.write(0, b, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, s.sbt);
@@ -228,8 +241,8 @@ std::vector<uint32_t> DeviceTracer::control() const {
     return {words, words + kControlWords};
 }
 
-void DeviceTracer::dispatch(const std::vector<uint32_t>& params, const void* input, size_t input_bytes, uint32_t lanes,
-                            uint32_t groups_x, uint32_t groups_y) {
+void DeviceTracer::dispatch(const std::vector<uint32_t>& params, const void* input, size_t input_bytes,
+                            uint32_t lanes, uint32_t groups_x, uint32_t groups_y) {
     State& s = *state_;
     if (lanes > s.capacity) {
         const VkBufferUsageFlags storage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
@@ -237,7 +250,8 @@ void DeviceTracer::dispatch(const std::vector<uint32_t>& params, const void* inp
         const uint32_t save_words = s.options.variant == Variant::Probe ? 4 : (saves ? kSaveWords : 0);
         s.rays = tools::Buffer(s.context, lanes * sizeof(Ray), storage, tools::MemoryKind::Host);
         s.results = tools::Buffer(s.context, lanes * kResultWords * 4, storage, tools::MemoryKind::Readback);
-        s.scratch = tools::Buffer(s.context, VkDeviceSize(lanes) * save_words * 4, storage, tools::MemoryKind::Device);
+        s.scratch = tools::Buffer(s.context, VkDeviceSize(lanes) * save_words * 4, storage,
+                                  tools::MemoryKind::Device);
         s.write(1, 0, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, s.rays);
         s.write(1, 1, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, s.results);
         s.write(0, RTC_BINDING_SCRATCH, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, s.scratch);
@@ -250,7 +264,8 @@ void DeviceTracer::dispatch(const std::vector<uint32_t>& params, const void* inp
     s.context.run([&](VkCommandBuffer commands) {
         timer.reset(commands);
         vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, s.pipeline);
-        vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, s.layout, 0, 2, s.sets.data(), 0, nullptr);
+        vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, s.layout, 0, 2, s.sets.data(), 0,
+                                nullptr);
         timer.begin(commands);
         vkCmdDispatch(commands, groups_x, groups_y, 1);
         timer.end(commands);

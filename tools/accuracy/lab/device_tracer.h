@@ -23,11 +23,11 @@ struct Ray {
 };
 
 enum RayMode : uint32_t {
-    kIgnore = 1u << 8,      // any-hit ignores every candidate
-    kTerminate = 2u << 8,   // any-hit terminates the ray
-    kNoReport = 4u << 8,    // intersection reports nothing
+    kIgnore = 1u << 8,     // any-hit ignores every candidate
+    kTerminate = 2u << 8,  // any-hit terminates the ray
+    kNoReport = 4u << 8,   // intersection reports nothing
     kNullRoot = 8u << 8,
-    kBottomRoot = 16u << 8, // trace a bottom level
+    kBottomRoot = 16u << 8,  // trace a bottom level
 };
 
 struct RayResult {
@@ -72,8 +72,8 @@ class DeviceTracer {
                                 const std::vector<uint32_t>& indices, uint32_t groups_x, uint32_t groups_y);
     std::vector<uint32_t> control() const;  // control block words of the last dispatch
 
-    double seconds = 0;          // of the last trace, on the device
-    uint32_t error = 0;          // launch error of the last trace
+    double seconds = 0;  // of the last trace, on the device
+    uint32_t error = 0;  // launch error of the last trace
     uint32_t error_count = 0;
     uint32_t error_detail = 0;
 

@@ -30,7 +30,8 @@ D3 sub(const Vec3& a, const Vec3& b) { return {double(a.x) - b.x, double(a.y) - 
 // Triple product d . (a x b), with a bound on its error: each component
 // difference is off by 2^-53 relative, and at most 8 roundings follow.
 double triple(const D3& d, const D3& a, const D3& b, double& error) {
-    const double px = a.y * b.z, qx = a.z * b.y, py = a.z * b.x, qy = a.x * b.z, pz = a.x * b.y, qz = a.y * b.x;
+    const double px = a.y * b.z, qx = a.z * b.y, py = a.z * b.x, qy = a.x * b.z, pz = a.x * b.y,
+                 qz = a.y * b.x;
     const double magnitude = std::fabs(d.x) * (std::fabs(px) + std::fabs(qx)) +
                              std::fabs(d.y) * (std::fabs(py) + std::fabs(qy)) +
                              std::fabs(d.z) * (std::fabs(pz) + std::fabs(qz));
@@ -56,7 +57,8 @@ bool filtered_out(const ExactRay& ray, const Triangle& v) {
 
 Verdict intersect(const ExactRay& ray, const Triangle& v, mpq_class* t) {
     const Q3 d = {q(ray.direction.x), q(ray.direction.y), q(ray.direction.z)};
-    const Q3 a = difference(v[0], ray.origin), b = difference(v[1], ray.origin), c = difference(v[2], ray.origin);
+    const Q3 a = difference(v[0], ray.origin), b = difference(v[1], ray.origin),
+             c = difference(v[2], ray.origin);
     const mpq_class s0 = dot(d, cross(b, c)), s1 = dot(d, cross(c, a)), s2 = dot(d, cross(a, b));
     const mpq_class sum = s0 + s1 + s2;
     const int side = sgn(sum);

@@ -71,7 +71,8 @@ struct Builder {
         Bounds centres;
         for (size_t i = begin; i < end; ++i) {
             const Bounds& b = bounds[order[i]];
-            centres.add(Vec3{b.min[0] / 2 + b.max[0] / 2, b.min[1] / 2 + b.max[1] / 2, b.min[2] / 2 + b.max[2] / 2});
+            centres.add(
+                Vec3{b.min[0] / 2 + b.max[0] / 2, b.min[1] / 2 + b.max[1] / 2, b.min[2] / 2 + b.max[2] / 2});
         }
         int axis = 0;
         for (int i = 1; i < 3; ++i) {
@@ -79,9 +80,8 @@ struct Builder {
         }
         const size_t middle = begin + (end - begin) / 2;
         auto centre = [&](uint32_t p) { return bounds[p].min[axis] / 2 + bounds[p].max[axis] / 2; };
-        std::sort(order.begin() + begin, order.begin() + end, [&](uint32_t a, uint32_t b) {
-            return std::pair(centre(a), a) < std::pair(centre(b), b);
-        });
+        std::sort(order.begin() + begin, order.begin() + end,
+                  [&](uint32_t a, uint32_t b) { return std::pair(centre(a), a) < std::pair(centre(b), b); });
         if (level > 30) return middle;
         // Full sweep along one axis: enough quality for step counts to mean something.
         std::vector<double> right(end - begin);
@@ -95,7 +95,8 @@ struct Builder {
         double best_cost = std::numeric_limits<double>::infinity();
         for (size_t i = begin; i + 1 < end; ++i) {
             left.add(bounds[order[i]]);
-            const double cost = left.area() * double(i + 1 - begin) + right[i + 1 - begin] * double(end - i - 1);
+            const double cost =
+                left.area() * double(i + 1 - begin) + right[i + 1 - begin] * double(end - i - 1);
             if (cost < best_cost) {
                 best_cost = cost;
                 best = i + 1;
@@ -135,7 +136,8 @@ struct Builder {
 uint32_t bits(float f) { return std::bit_cast<uint32_t>(f); }
 
 struct Heap {
-    std::vector<uint32_t> words = std::vector<uint32_t>(RTC_AS_ALIGNMENT / 4, 0u);  // quad 0 is never given out
+    std::vector<uint32_t> words =
+        std::vector<uint32_t>(RTC_AS_ALIGNMENT / 4, 0u);  // quad 0 is never given out
 
     uint32_t allocate(size_t quads) {
         const uint32_t base = uint32_t(words.size() / 4);
@@ -227,8 +229,8 @@ Built build_blas(Heap& heap, const Blas& blas, const BuildOptions& options) {
     const size_t quads =
         RTC_AS_HEADER_QUADS + builder.nodes.size() * RTC_NODE_QUADS + builder.order.size() * slot_quads;
     built.base = heap.allocate(quads);
-    write_header(heap, built.base, RTC_AS_KIND_BOTTOM, built.facts, builder, built.bounds, builder.order.size(),
-                 primitives.size(), uint32_t(quads), options.inflate);
+    write_header(heap, built.base, RTC_AS_KIND_BOTTOM, built.facts, builder, built.bounds,
+                 builder.order.size(), primitives.size(), uint32_t(quads), options.inflate);
     uint32_t* slot = heap.at(built.base + heap.at(built.base)[RTC_HDR_SLOTS]);
     for (uint32_t p : builder.order) {
         const Primitive primitive = primitives[p];

@@ -47,7 +47,7 @@ struct BuildOptions {
     uint32_t leaf_size = 4;
     // One primitive split off at each of the first levels. 46 leaves 14 levels for the rest.
     uint32_t chain = 0;
-    float inflate = 0;   // boxes grow by this much of the structure's size: a tree that culls nothing near
+    float inflate = 0;  // boxes grow by this much of the structure's size: a tree that culls nothing near
 };
 
 // Heap words of a scene; quad `root` is the top level.

@@ -43,7 +43,8 @@ std::vector<Ray> leak_rays(const LeakCase& c, uint64_t count, uint64_t batch) {
         double v[3] = {normal(random), normal(random), normal(random)};
         const double length = std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
         const double reach = c.from_inside ? 0.2 : c.distance;
-        Vec3 origin = {float(c.centre.x + v[0] / length * reach * c.size), float(c.centre.y + v[1] / length * reach * c.size),
+        Vec3 origin = {float(c.centre.x + v[0] / length * reach * c.size),
+                       float(c.centre.y + v[1] / length * reach * c.size),
                        float(c.centre.z + v[2] / length * reach * c.size)};
         if (c.from_zero) origin = {float(v[0] / length), float(v[1] / length), float(v[2] / length)};
         Vec3 world_origin, direction;

@@ -15,12 +15,12 @@ struct LeakCase {
     const IndexedMesh* mesh = nullptr;
     Instance instance;  // of the mesh
     Aim aim = Aim::Edge;
-    bool from_inside = false;    // origins near `centre`, which must lie inside the mesh
-    Vec3 centre;                 // of the mesh, object space
-    double size = 1;             // radius of a ball round the mesh
-    double distance = 3;         // of outside origins, in sizes
-    bool from_zero = false;      // outside origins lie within one unit of (0, 0, 0) instead
-    int axis_parallel = -1;      // >= 0: rays run along this axis exactly
+    bool from_inside = false;  // origins near `centre`, which must lie inside the mesh
+    Vec3 centre;               // of the mesh, object space
+    double size = 1;           // radius of a ball round the mesh
+    double distance = 3;       // of outside origins, in sizes
+    bool from_zero = false;    // outside origins lie within one unit of (0, 0, 0) instead
+    int axis_parallel = -1;    // >= 0: rays run along this axis exactly
     uint64_t seed = 1;
 };
 

@@ -30,17 +30,18 @@ std::vector<Triangle> IndexedMesh::soup() const {
 
 IndexedMesh make_icosphere(uint32_t subdivisions) {
     const double g = std::numbers::phi;
-    std::vector<P> points = {{-1, g, 0}, {1, g, 0},   {-1, -g, 0}, {1, -g, 0}, {0, -1, g},  {0, 1, g},
+    std::vector<P> points = {{-1, g, 0},  {1, g, 0},  {-1, -g, 0}, {1, -g, 0}, {0, -1, g},  {0, 1, g},
                              {0, -1, -g}, {0, 1, -g}, {g, 0, -1},  {g, 0, 1},  {-g, 0, -1}, {-g, 0, 1}};
     for (P& p : points) p = normalized(p);
     std::vector<std::array<uint32_t, 3>> faces = {
-        {0, 11, 5}, {0, 5, 1},  {0, 1, 7},  {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
-        {11, 10, 2}, {10, 7, 6}, {7, 1, 8}, {3, 9, 4},  {3, 4, 2},   {3, 2, 6}, {3, 6, 8},
-        {3, 8, 9},  {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1}};
+        {0, 11, 5},  {0, 5, 1},  {0, 1, 7},  {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
+        {11, 10, 2}, {10, 7, 6}, {7, 1, 8},  {3, 9, 4},  {3, 4, 2},   {3, 2, 6}, {3, 6, 8},
+        {3, 8, 9},   {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1}};
     for (uint32_t s = 0; s < subdivisions; ++s) {
         std::map<std::pair<uint32_t, uint32_t>, uint32_t> middles;
         auto middle = [&](uint32_t a, uint32_t b) {
-            auto [it, fresh] = middles.try_emplace(std::pair(std::min(a, b), std::max(a, b)), uint32_t(points.size()));
+            auto [it, fresh] =
+                middles.try_emplace(std::pair(std::min(a, b), std::max(a, b)), uint32_t(points.size()));
             if (fresh) {
                 points.push_back(normalized(
                     {points[a].x + points[b].x, points[a].y + points[b].y, points[a].z + points[b].z}));
@@ -152,7 +153,8 @@ IndexedMesh make_cube_grid(uint32_t n) {
 IndexedMesh make_plane(uint32_t n) {
     IndexedMesh mesh{"plane", {}, {}};
     for (uint32_t i = 0; i <= n; ++i) {
-        for (uint32_t j = 0; j <= n; ++j) mesh.vertices.push_back(rounded({2.0 * i / n - 1, 2.0 * j / n - 1, 0}));
+        for (uint32_t j = 0; j <= n; ++j)
+            mesh.vertices.push_back(rounded({2.0 * i / n - 1, 2.0 * j / n - 1, 0}));
     }
     for (uint32_t i = 0; i < n; ++i) {
         for (uint32_t j = 0; j < n; ++j) {

@@ -27,7 +27,8 @@ enum : uint32_t {
 
 template <typename Visit>
 void each_instruction(const std::vector<uint32_t>& spirv, Visit visit) {
-    for (size_t at = 5; at < spirv.size(); at += spirv[at] >> 16) visit(spirv[at] & 0xffff, at, spirv[at] >> 16);
+    for (size_t at = 5; at < spirv.size(); at += spirv[at] >> 16)
+        visit(spirv[at] & 0xffff, at, spirv[at] >> 16);
 }
 
 }  // namespace
@@ -37,9 +38,11 @@ void decorate_no_contraction(std::vector<uint32_t>& spirv) {
     size_t first = 0;
     each_instruction(spirv, [&](uint32_t op, size_t at, size_t) {
         if (op == OpDecorate && first == 0) first = at;
-        const bool arithmetic = op == OpFNegate || op == OpFAdd || op == OpFSub || op == OpFMul ||
-                                (op >= OpFDiv && op <= OpDot);
-        if (arithmetic) decorations.insert(decorations.end(), {3u << 16 | OpDecorate, spirv[at + 2], DecorationNoContraction});
+        const bool arithmetic =
+            op == OpFNegate || op == OpFAdd || op == OpFSub || op == OpFMul || (op >= OpFDiv && op <= OpDot);
+        if (arithmetic)
+            decorations.insert(decorations.end(),
+                               {3u << 16 | OpDecorate, spirv[at + 2], DecorationNoContraction});
     });
     spirv.insert(spirv.begin() + first, decorations.begin(), decorations.end());
 }
