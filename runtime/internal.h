@@ -88,6 +88,7 @@ bool rtr_load_device_table(const RtrInstanceTable* instance, VkDevice device, Rt
     X(refit_triangles)  \
     X(refit_aabbs)      \
     X(refit_nodes)      \
+    X(prepare_launch)   \
     X(finish_launch)    \
     X(probe)
 

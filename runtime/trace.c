@@ -164,6 +164,8 @@ typedef struct Launch {
     VkDescriptorBufferInfo sbt[4];
     VkDeviceSize sbt_offset[4]; /* of the region in its binding */
     uint32_t size[3];
+    VkBuffer indirect; /* extents on the device; size is then the largest */
+    VkDeviceSize indirect_offset;
     VkDeviceSize params, control; /* in the control buffer */
     VkDescriptorSet reserved;
 } Launch;
@@ -448,6 +450,51 @@ static VkResult finish_tile(const Launch* l) {
     return VK_SUCCESS;
 }
 
+/* Corrects the parameters by the extents that lie in device memory. */
+static VkResult prepare_indirect(const Launch* l) {
+    RtrRecorder r = l->r;
+    RtrDevice d = r->device;
+    const VkDeviceSize begin = l->indirect_offset / 256 * 256;
+    const uint32_t slots = l->shape.tiles * l->shape.rounds;
+    const VkDescriptorBufferInfo infos[3] = {
+        {l->indirect, begin, l->indirect_offset + 12 - begin},
+        {r->control, l->params, (VkDeviceSize)slots * param_stride(d)},
+        {r->control, l->control, control_bytes(l->shape.rounds)},
+    };
+    const uint32_t bindings[3] = {RTR_IN_DATA, RTR_ARR_STATE, RTR_ARR_DST_HEADER};
+    VkWriteDescriptorSet writes[3];
+    VkDescriptorSet sets[2];
+    struct RtrBuildPush push;
+    uint32_t i;
+    VkResult result = rtr_allocate_set(r, d->input_layout, &sets[0]);
+    if (result == VK_SUCCESS) result = rtr_allocate_set(r, d->array_layout, &sets[1]);
+    if (result != VK_SUCCESS) return result;
+    memset(writes, 0, sizeof writes);
+    for (i = 0; i < 3; i++) {
+        writes[i].sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
+        writes[i].dstSet = sets[i ? 1 : 0];
+        writes[i].dstBinding = bindings[i];
+        writes[i].descriptorCount = 1;
+        writes[i].descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+        writes[i].pBufferInfo = &infos[i];
+    }
+    d->vk.UpdateDescriptorSets(d->device, 3, writes, 0, NULL);
+    memset(&push, 0, sizeof push);
+    push.data_offset = (uint32_t)(l->indirect_offset - begin);
+    push.count = slots;
+    push.data_stride = param_stride(d) / 4;
+    push.step = l->shape.rounds;
+    push.total = l->shape.tile_lanes;
+    push.blocks = l->p->options.workgroupSize;
+    push.window_count = (uint32_t)l->shape.lanes;
+    d->vk.CmdBindPipeline(r->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, d->kernels[RTR_KERNEL_prepare_launch]);
+    d->vk.CmdBindDescriptorSets(r->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, d->kernel_layout, 0, 2, sets, 0, NULL);
+    d->vk.CmdPushConstants(r->cmd, d->kernel_layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof push, &push);
+    d->vk.CmdDispatch(r->cmd, rtr_groups(slots, RTR_GROUP), 1, 1);
+    rtr_compute_barrier(r);
+    return VK_SUCCESS;
+}
+
 static VkResult record_tiles(Launch* l) {
     RtrRecorder r = l->r;
     const RtrDeviceTable* vk = &r->device->vk;
@@ -509,9 +556,9 @@ static VkResult take_control(Launch* l) {
     return VK_SUCCESS;
 }
 
-VkResult rtrCmdTraceRaysRegions(RtrRecorder r, const RtrStridedBufferRegion* raygen, const RtrStridedBufferRegion* miss,
-                                const RtrStridedBufferRegion* hit, const RtrStridedBufferRegion* callable, uint32_t w,
-                                uint32_t h, uint32_t d) {
+static VkResult trace(RtrRecorder r, const RtrStridedBufferRegion* raygen, const RtrStridedBufferRegion* miss,
+                      const RtrStridedBufferRegion* hit, const RtrStridedBufferRegion* callable, VkBuffer indirect,
+                      VkDeviceSize indirect_offset, uint32_t w, uint32_t h, uint32_t d) {
     static const char* const names[4] = {"raygen", "miss", "hit", "callable"};
     const RtrStridedBufferRegion* given[4];
     Launch l;
@@ -541,6 +588,8 @@ VkResult rtrCmdTraceRaysRegions(RtrRecorder r, const RtrStridedBufferRegion* ray
         return rtr_error(r->device, VK_ERROR_FEATURE_NOT_PRESENT, "maxStorageBufferRange",
                          "heap of %llu bytes with RTR_FETCH_STORAGE: maxStorageBufferRange is %u; use RTR_FETCH_TEXEL",
                          (unsigned long long)r->heap->size, r->device->limits.maxStorageBufferRange);
+    l.indirect = indirect;
+    l.indirect_offset = indirect_offset;
     l.size[0] = w;
     l.size[1] = h;
     l.size[2] = d;
@@ -553,12 +602,29 @@ VkResult rtrCmdTraceRaysRegions(RtrRecorder r, const RtrStridedBufferRegion* ray
     upload_params(&l);
     reset_control(&l, 0, true);
     after_transfer(r);
+    if (indirect && (result = prepare_indirect(&l)) != VK_SUCCESS) return result;
     if ((result = record_tiles(&l)) != VK_SUCCESS) return result;
     r->launches[r->launch_count].offset = l.control;
     r->launches[r->launch_count].size = control_bytes(l.shape.rounds);
     r->launch_count++;
     r->control_used = l.control + control_bytes(l.shape.rounds) - r->control_offset;
     return VK_SUCCESS;
+}
+
+VkResult rtrCmdTraceRaysRegions(RtrRecorder r, const RtrStridedBufferRegion* raygen, const RtrStridedBufferRegion* miss,
+                                const RtrStridedBufferRegion* hit, const RtrStridedBufferRegion* callable, uint32_t w,
+                                uint32_t h, uint32_t d) {
+    return trace(r, raygen, miss, hit, callable, VK_NULL_HANDLE, 0, w, h, d);
+}
+
+VkResult rtrCmdTraceRaysIndirect(RtrRecorder r, const RtrStridedBufferRegion* raygen,
+                                 const RtrStridedBufferRegion* miss, const RtrStridedBufferRegion* hit,
+                                 const RtrStridedBufferRegion* callable, VkBuffer indirect, VkDeviceSize offset,
+                                 uint32_t max_w, uint32_t max_h, uint32_t max_d) {
+    if (!indirect || offset % 4)
+        return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "indirect-buffer",
+                         "indirectBuffer missing, or indirectOffset %llu not a multiple of 4", (unsigned long long)offset);
+    return trace(r, raygen, miss, hit, callable, indirect, offset, max_w, max_h, max_d);
 }
 
 VkResult rtrCmdTraceRays(RtrRecorder r, VkBuffer raygenBuffer, VkDeviceSize raygenOffset, VkBuffer missBuffer,

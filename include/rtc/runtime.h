@@ -525,6 +525,16 @@ RTR_API VkResult rtrCmdTraceRaysRegions(RtrRecorder recorder, const RtrStridedBu
                                         const RtrStridedBufferRegion* pCallable, uint32_t width, uint32_t height,
                                         uint32_t depth);
 
+/* Counterpart: vkCmdTraceRaysIndirectKHR, with a buffer and offset (STORAGE usage; a
+ * multiple of 4) that hold a VkTraceRaysIndirectCommandKHR, read in COMPUTE_SHADER with
+ * SHADER_READ. The largest extents size scratch, tiles and the dispatch; extents with more
+ * lanes than those trace nothing and set the launch error UNFINISHED. */
+RTR_API VkResult rtrCmdTraceRaysIndirect(RtrRecorder recorder, const RtrStridedBufferRegion* pRaygen,
+                                         const RtrStridedBufferRegion* pMiss, const RtrStridedBufferRegion* pHit,
+                                         const RtrStridedBufferRegion* pCallable, VkBuffer indirectBuffer,
+                                         VkDeviceSize indirectOffset, uint32_t maxWidth, uint32_t maxHeight,
+                                         uint32_t maxDepth);
+
 /* ---- Launch errors ----------------------------------------------------------------------
  * Each launch has a control block in the recorder's control region: the shader counts
  * what went wrong there (depth overflows, bad handles, broken assumptions, lanes that

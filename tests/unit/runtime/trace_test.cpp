@@ -255,6 +255,7 @@ class ResumeTest : public TraceTest {
         VkResult expected = VK_SUCCESS;
         int launches = 1;
         bool in_set = false;
+        uint32_t max[3] = {0, 0, 0};  // indirect when set
     };
 
     void run(const Run& c) {
@@ -321,6 +322,16 @@ class ResumeTest : public TraceTest {
         for (int l = 0; l < c.launches; l++) {
             RtrStridedBufferRegion rg{sbt.handle, 320 + table.raygen.offset, table.raygen.stride, table.raygen.size};
             RtrStridedBufferRegion hg{sbt.handle, 320 + table.hit.offset, table.hit.stride, table.hit.size};
+            if (c.max[0]) {
+                VkTraceRaysIndirectCommandKHR extents{c.w, c.h, c.d};
+                Buffer indirect = scene.upload(nullptr, 512);
+                memcpy(indirect.as<char>(260), &extents, sizeof extents);
+                ASSERT_EQ(rtrCmdTraceRaysIndirect(rec, &rg, nullptr, &hg, nullptr, indirect.handle, 260, c.max[0], c.max[1],
+                                                  c.max[2]),
+                          c.expected);
+                vk->compute_barrier();
+                continue;
+            }
             ASSERT_EQ(rtrCmdTraceRaysRegions(rec, &rg, nullptr, &hg, nullptr, c.w, c.h, c.d), c.expected);
             vk->compute_barrier();
         }
@@ -331,7 +342,8 @@ class ResumeTest : public TraceTest {
             const uint32_t* r = result.as<uint32_t>() + 4 * i;
             uint32_t x = i % c.w, y = i / c.w % c.h;
             uint32_t goal = c.turns + ((x * 7 + y * 3) & c.mask);
-            if (goal > c.budget * c.rounds || c.expected != VK_SUCCESS) {
+            bool too_large = c.max[0] && c.w > c.max[0];
+            if (goal > c.budget * c.rounds || c.expected != VK_SUCCESS || too_large) {
                 EXPECT_EQ(r[0], 0u) << i;
                 unfinished++;
                 continue;
@@ -383,6 +395,24 @@ TEST_F(ResumeTest, ReservedInTheApplicationsSet) {
     Run c;
     c.in_set = true;
     c.launches = 2;
+    run(c);
+}
+TEST_F(ResumeTest, Indirect) {
+    Run c;
+    c.max[0] = 64, c.max[1] = 40, c.max[2] = 2;
+    c.launches = 2;
+    run(c);
+}
+TEST_F(ResumeTest, IndirectRowsInTiles) {
+    Run c;
+    c.w = 70, c.h = 1, c.d = 5;
+    c.max[0] = 100, c.max[1] = 2, c.max[2] = 5;
+    c.tile = 160;
+    run(c);
+}
+TEST_F(ResumeTest, IndirectBeyondItsMaximum) {
+    Run c;
+    c.max[0] = 16, c.max[1] = 16, c.max[2] = 1;
     run(c);
 }
 TEST_F(ResumeTest, RoundsRunOut) {
