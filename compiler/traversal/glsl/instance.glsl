@@ -24,7 +24,9 @@ mat4x3 rtc_object_to_world(uint root, uint instance) {
     return rtc_matrix(rtc_instance_record(root, instance) + 3u);
 }
 
-mat4x3 rtc_world_to_object(uint root, uint instance) { return rtc_matrix(rtc_instance_record(root, instance)); }
+mat4x3 rtc_world_to_object(uint root, uint instance) {
+    return rtc_matrix(rtc_instance_record(root, instance));
+}
 
 uint rtc_instance_custom_index(uint root, uint instance) {
     return rtc_quad(rtc_instance_record(root, instance) + 6u).z & 0x00ffffffu;

@@ -41,10 +41,11 @@ void rtc_trace_begin() {
     // null direction. All miss. A negative tmin acts as 0.
     vec3 o = rtc_ray_origin;
     vec3 d = rtc_ray_direction;
-    bool finite = rtc_finite(o.x) && rtc_finite(o.y) && rtc_finite(o.z) && rtc_finite(d.x) && rtc_finite(d.y) &&
-                  rtc_finite(d.z) && rtc_finite(rtc_ray_tmin);
+    bool finite = rtc_finite(o.x) && rtc_finite(o.y) && rtc_finite(o.z) && rtc_finite(d.x) &&
+                  rtc_finite(d.y) && rtc_finite(d.z) && rtc_finite(rtc_ray_tmin);
     // An infinite tmax is legal; as bits it is below every NaN.
-    bool ordered = (floatBitsToUint(rtc_ray_tmax) & 0x7fffffffu) <= 0x7f800000u && rtc_ray_tmin <= rtc_ray_tmax;
+    bool ordered =
+        (floatBitsToUint(rtc_ray_tmax) & 0x7fffffffu) <= 0x7f800000u && rtc_ray_tmin <= rtc_ray_tmax;
     if (rtc_ray_root != 0u && finite && ordered && rtc_largest(d) > 0.0) {
         uvec4 header = rtc_quad(rtc_ray_root); // self low, self high, magic, kind
         if (header.z != RTC_AS_MAGIC || header.w != RTC_AS_KIND_TOP) {
@@ -258,7 +259,8 @@ uint rtc_trace_step() {
                         uint slot = rtc_trav_cur & RTC_REF_INDEX_MASK;
                         rtc_trav_cur += 1u - (1u << RTC_REF_COUNT_SHIFT);
                         rtc_trav_cur = rtc_count(rtc_trav_cur) == 0u ? RTC_REF_POP : rtc_trav_cur;
-                        if (RTC_LINK_AABBS && (!RTC_LINK_TRIANGLES || (rtc_trav_bits & RTC_LEVEL_AABBS) != 0u)) {
+                        if (RTC_LINK_AABBS &&
+                            (!RTC_LINK_TRIANGLES || (rtc_trav_bits & RTC_LEVEL_AABBS) != 0u)) {
                             result = rtc_test_aabb(slot);
                         } else if (RTC_LINK_TRIANGLES) {
                             result = rtc_test_triangle(slot);
