@@ -1,0 +1,93 @@
+#!/usr/bin/env python3
+"""rtc-run itself: what it says about bad input, and that a wrong result is seen as one.   test_rtc_run.py RTC-RUN"""
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+
+PROGRAM = sys.argv.pop(1)
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+HELLO = [os.path.join(ROOT, "testdata/shaders/run/hello." + s) for s in ("rgen", "rchit", "rmiss")]
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+sys.dont_write_bytecode = True
+import suite
+
+
+def run(*arguments):
+    done = subprocess.run([PROGRAM, "--device", "llvmpipe", *arguments], capture_output=True, text=True)
+    return done.returncode, done.stdout + done.stderr
+
+
+class RtcRun(unittest.TestCase):
+    def fails(self, text, *arguments):
+        code, said = run(*arguments)
+        self.assertEqual(code, 1, said)  # an error, not a crash
+        self.assertIn(text, said)
+
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+
+    def file(self, name, content):
+        path = os.path.join(self.folder.name, name)
+        with open(path, "wb") as out:
+            out.write(content if isinstance(content, bytes) else content.encode())
+        return path
+
+    def test_bad_command_lines(self):
+        self.fails("no stages")
+        self.fails("cannot read", "nowhere.rgen")
+        self.fails("cannot tell the stage", self.file("a.glsl", "void main() {}"))
+        self.fails("SET.BINDING", *HELLO, "--bind", "x=u32:1")
+        self.fails("no shader uses", *HELLO, "--bind", "7.7=u32:1")
+        self.fails("NAME=VALUE", *HELLO, "--bind", "0.1")
+        self.fails("WIDTHxHEIGHT", *HELLO, "--size", "wide")
+        self.fails("is khr or nv", *HELLO, "--native", "dxr")
+        self.fails("unknown image pattern", *HELLO, "--bind", "0.1=pattern:nothing")
+
+    def test_bad_shaders(self):
+        self.fails("undeclared identifier", self.file("a.rgen", "#version 460\n#extension GL_NV_ray_tracing : require\nvoid main() { x x; }"))
+        self.fails("not a SPIR-V module", self.file("a.spv", b"\x03\x02\x23\x07\x00"))
+        self.fails("truncated SPIR-V", self.file("b.spv", (0x07230203).to_bytes(4, "little") + bytes(16) + b"\x11\x00\xff\x00"))
+        self.fails("no ray tracing entry point", self.file("c.spv", (0x07230203).to_bytes(4, "little") + bytes(16)))
+
+    def test_bad_scenes(self):
+        for scene, text in (('{"meshes": [{"boxes": [1, 2]}]}', "six numbers"), ('{"mehses": []}', "unknown key"),
+                            ('{"meshes": [{"triangles": [1]}]}', "nine numbers"),
+                            ('{"meshes": [], "instances": [{"mesh": "x"}]}', "there is no mesh"),
+                            ('{"meshes": [{"vertices": [0,0,0], "indices": [0,0,9]}]}', "past the last vertex"), ("{", "parse error")):
+            self.fails(text, *HELLO, "--scene", self.file("s.json", scene))
+
+    def test_native_ray_tracing_that_is_not_there(self):
+        self.fails("VK_NV_ray_tracing", *HELLO, "--native", "nv")
+
+    def case(self, value, **more):
+        return self.file("case.json", json.dumps({
+            "stages": [{"stage": "rgen", "source": suite.nv("void main() { r[0] = 5u; }\n", scene=False)}],
+            "bindings": {"0.1": {"size": 64}}, "expect": [{"cell": "five", "at": 0, "values": [value]}], **more}))
+
+    def test_a_right_result_passes_and_a_wrong_one_fails(self):
+        code, said = run("--case", self.case(5))
+        self.assertEqual(code, 0, said)
+        self.assertIn("pass five", said)
+        code, said = run("--case", self.case(6))
+        self.assertEqual(code, 1, said)
+        self.assertIn("FAIL five: value 0: 5, expected 6", said)
+        self.case(6)
+        code, said = run("--suite", self.folder.name, "--on", "rtc-nv,rtc-ext")
+        self.assertEqual(code, 1, said)
+        self.assertIn("0 passed, 2 failed", said)
+
+    def test_outputs(self):
+        path = os.path.join(self.folder.name, "out.json")
+        code, said = run("--case", self.case(5), "-o", "0.1=" + path)
+        self.assertEqual(code, 0, said)
+        with open(path) as file:
+            self.assertEqual(json.load(file)["r"][:2], [5, 0])
+        self.fails("is a buffer", "--case", self.case(5), "-o", os.path.join(self.folder.name, "out.png"))
+        self.fails("unknown key", "--case", self.case(5, colour="red"))
+
+
+unittest.main()
