@@ -79,8 +79,9 @@ Row measure(unsigned shaders, int repeat) {
     return row;
 }
 
-std::vector<uint32_t> linked_module(unsigned shaders) {
+std::vector<uint32_t> linked_module(unsigned shaders, bool optimize) {
     LinkOptions options;
+    options.optimize = optimize ? Optimization::Performance : Optimization::None;
     options.max_recursion_depth = 2;
     LinkResult result = link_pipeline(link_input(front_end(synthetic_pipeline(shaders))), options);
     if (!result.ok) stop(result.diagnostics);
@@ -108,11 +109,12 @@ int run(int argc, char** argv) {
         "compile", "Compile time of synthetic pipelines whose closest-hit shaders trace once each");
     std::vector<unsigned> shaders{1, 4, 16, 64, 256};
     int repeat = 3;
-    bool driver = false;
+    bool driver = false, optimize = false;
     std::string device, json_file;
     compile.add_option("--shaders", shaders, "Numbers of closest-hit shaders")->delimiter(',')->capture_default_str();
     compile.add_option("--repeat", repeat, "Runs of each; the least counts")->check(CLI::PositiveNumber)->capture_default_str();
     compile.add_flag("--driver", driver, "Also measure the Vulkan driver's compile: pipeline creation and first launch");
+    compile.add_flag("-O,--optimize", optimize, "Give --driver the module that -O makes");
     compile.add_option("--device", device, "Index or part of the name of the device for --driver");
     compile.add_option("--json", json_file, "Write the figures to this file too");
     CLI11_PARSE(app, argc, argv);
@@ -124,7 +126,7 @@ int run(int argc, char** argv) {
     if (driver) {
         DriverCompiler compiler(device);
         driver_name = compiler.name();
-        for (Row& row : rows) row.driver_s = compiler.cpu_seconds(linked_module(row.shaders));
+        for (Row& row : rows) row.driver_s = compiler.cpu_seconds(linked_module(row.shaders, optimize));
     }
     print(rows, driver_name);
 
