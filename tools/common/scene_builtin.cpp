@@ -107,7 +107,6 @@ Scene spheres() {
     grow(glm::mat4(1.0f), 0);
     checkerboard(scene, 12.0f, 24, -1.0f, light, dark);
     scene.lights.push_back({{4, 6, 5}, glm::vec3(220.0f)});
-    scene.lights.push_back({{-6, 5, 2}, glm::vec3(60.0f, 75.0f, 110.0f)});
     scene.sky_low = {0.35f, 0.32f, 0.3f};
     scene.sky_high = {0.15f, 0.3f, 0.65f};
     scene.camera = {{2.6f, 2.0f, 4.2f}, {0, 0.25f, 0}, {0, 1, 0}, glm::radians(40.0f)};

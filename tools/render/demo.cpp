@@ -18,9 +18,9 @@ void draw_demo(const RtcDevice& device, const std::string& folder, const RenderO
     const Shot shots[] = {
         {"Cornell box, path traced", "builtin:cornell", "cornell-path.png", Integrator::Path, 32, 6},
         {"sphere flake, recursive reflections", "builtin:spheres", "spheres-reflections.png",
-         Integrator::Reflections, 4, 0},
-        {"scanned bunny, 69 666 triangles, path traced", "builtin:bunny", "bunny-path.png", Integrator::Path,
-         16},
+         Integrator::Reflections, 6, 0},
+        {"scanned bunny, 69 666 triangles, path traced", "builtin:bunny", "bunny-path.png", Integrator::Path, 16,
+         4},
     };
     std::filesystem::create_directories(folder);
     const auto start = std::chrono::steady_clock::now();
