@@ -252,7 +252,12 @@ Function Machine::build_main(const std::vector<Function>& stage_functions) {
         const Id round = e.load(u32, e.chain(spv::StorageClass::Uniform, u32, reserved.at(RTC_BINDING_PARAMS),
                                              {p.constant_u32(0), p.constant_u32(RTC_PARAM_ROUND / 4),
                                               p.constant_u32(RTC_PARAM_ROUND % 4)}));
-        code.branch(e.value(Op::OpIEqual, p.bool_type(), {round, p.constant_u32(0)}), start, [&] {
+        // Written so that it depends on the lane: lavapipe re-optimises a whole shader at each launch for
+        // the sake of a branch on uniforms alone.
+        const Id started = e.value(Op::OpINotEqual, p.bool_type(), {round, p.constant_u32(0)});
+        const Id limit = e.select(u32, started, p.constant_u32(0xffffffffu), p.constant_u32(0));
+        const Id first = e.value(Op::OpUGreaterThanEqual, p.bool_type(), {load(e, "rtc_lane"), limit});
+        code.branch(first, start, [&] {
             Emitter again = code.e();
             const Id saved = call(again, "rtc_scratch_load", {p.constant_u32(0)});
             code.branch(code.equal(saved, kStateDone), [&] { code.e().effect(Op::OpReturn, {}); });
