@@ -5,7 +5,8 @@
 #define MAX_INSTANCES (1u << 24)
 
 static VkResult bad(RtrDevice d, const char* id, const char* text, unsigned geometry) {
-    return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, id, "acceleration structure, geometry %u: %s", geometry, text);
+    return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, id, "acceleration structure, geometry %u: %s",
+                     geometry, text);
 }
 
 bool rtr_vertex_format(VkFormat format, uint32_t* code, uint32_t* bytes, uint32_t* component_bytes) {
@@ -23,40 +24,50 @@ bool rtr_vertex_format(VkFormat format, uint32_t* code, uint32_t* bytes, uint32_
             components = 2;
             break;
         case VK_FORMAT_R16G16B16_SFLOAT:
-        case VK_FORMAT_R16G16B16A16_SFLOAT: *code = RTR_VERTEX_HALF3; break;
+        case VK_FORMAT_R16G16B16A16_SFLOAT:
+            *code = RTR_VERTEX_HALF3;
+            break;
         case VK_FORMAT_R16G16_SFLOAT:
             *code = RTR_VERTEX_HALF2;
             components = 2;
             break;
         case VK_FORMAT_R16G16B16_SNORM:
-        case VK_FORMAT_R16G16B16A16_SNORM: *code = RTR_VERTEX_SNORM3; break;
+        case VK_FORMAT_R16G16B16A16_SNORM:
+            *code = RTR_VERTEX_SNORM3;
+            break;
         case VK_FORMAT_R16G16_SNORM:
             *code = RTR_VERTEX_SNORM2;
             components = 2;
             break;
-        default: return false;
+        default:
+            return false;
     }
     *bytes = components * *component_bytes;
     return true;
 }
 
-static VkResult check_triangles(RtrDevice d, const VkGeometryTrianglesNV* t, unsigned g, uint32_t* primitives) {
+static VkResult check_triangles(RtrDevice d, const VkGeometryTrianglesNV* t, unsigned g,
+                                uint32_t* primitives) {
     uint32_t code, bytes, component;
     if (t->pNext) return bad(d, "pNext", "VkGeometryTrianglesNV::pNext must be NULL", g);
     if (!rtr_vertex_format(t->vertexFormat, &code, &bytes, &component))
         return rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "vertex-format",
-                         "acceleration structure, geometry %u: vertex format %d; VK_NV_ray_tracing lists R32G32B32_SFLOAT, "
+                         "acceleration structure, geometry %u: vertex format %d; VK_NV_ray_tracing lists "
+                         "R32G32B32_SFLOAT, "
                          "R32G32_SFLOAT, R16G16B16_SFLOAT, R16G16_SFLOAT, R16G16_SNORM, R16G16B16_SNORM",
                          g, (int)t->vertexFormat);
     if (t->vertexStride % component != 0 || (t->vertexStride < bytes && t->vertexCount > 1))
-        return bad(d, "vertex-stride", "vertexStride must be a multiple of the component size and hold a vertex", g);
+        return bad(d, "vertex-stride",
+                   "vertexStride must be a multiple of the component size and hold a vertex", g);
     if (t->vertexOffset % component != 0)
         return bad(d, "vertex-offset", "vertexOffset must be a multiple of the component size", g);
     switch (t->indexType) {
         case VK_INDEX_TYPE_NONE_NV:
-            if (t->indexCount != 0) return bad(d, "index-count", "indexCount must be 0 with VK_INDEX_TYPE_NONE_NV", g);
+            if (t->indexCount != 0)
+                return bad(d, "index-count", "indexCount must be 0 with VK_INDEX_TYPE_NONE_NV", g);
             *primitives = t->vertexCount / 3;
-            if (t->vertexCount % 3) return bad(d, "vertex-count", "vertexCount must be a multiple of 3 without indices", g);
+            if (t->vertexCount % 3)
+                return bad(d, "vertex-count", "vertexCount must be a multiple of 3 without indices", g);
             break;
         case VK_INDEX_TYPE_UINT16:
         case VK_INDEX_TYPE_UINT32:
@@ -69,7 +80,8 @@ static VkResult check_triangles(RtrDevice d, const VkGeometryTrianglesNV* t, uns
         default:
             return bad(d, "index-type", "indexType must be NONE_NV, UINT16 or UINT32", g);
     }
-    if (t->transformOffset % 16) return bad(d, "transform-offset", "transformOffset must be a multiple of 16", g);
+    if (t->transformOffset % 16)
+        return bad(d, "transform-offset", "transformOffset must be a multiple of 16", g);
     return VK_SUCCESS;
 }
 
@@ -86,12 +98,13 @@ VkResult rtr_check_geometry(RtrDevice d, const VkGeometryNV* g, unsigned index, 
     if (g->pNext) return bad(d, "pNext", "VkGeometryNV::pNext must be NULL", index);
     if (g->geometryType == VK_GEOMETRY_TYPE_TRIANGLES_NV)
         return check_triangles(d, &g->geometry.triangles, index, primitives);
-    if (g->geometryType == VK_GEOMETRY_TYPE_AABBS_NV) return check_aabbs(d, &g->geometry.aabbs, index, primitives);
+    if (g->geometryType == VK_GEOMETRY_TYPE_AABBS_NV)
+        return check_aabbs(d, &g->geometry.aabbs, index, primitives);
     return bad(d, "geometry-type", "geometryType must be TRIANGLES or AABBS", index);
 }
 
-static VkResult fill_from_info(RtrDevice d, RtrAccelerationStructure as, const VkAccelerationStructureInfoNV* info,
-                               const VkAllocationCallbacks* a) {
+static VkResult fill_from_info(RtrDevice d, RtrAccelerationStructure as,
+                               const VkAccelerationStructureInfoNV* info, const VkAllocationCallbacks* a) {
     uint64_t total = 0;
     uint32_t i;
     as->type = info->type;
@@ -100,18 +113,19 @@ static VkResult fill_from_info(RtrDevice d, RtrAccelerationStructure as, const V
         if (info->geometryCount)
             return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "as-counts", "a top level has no geometries");
         if (info->instanceCount > MAX_INSTANCES)
-            return rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "maxInstanceCount", "%u instances; the limit is %u",
-                             info->instanceCount, MAX_INSTANCES);
+            return rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "maxInstanceCount",
+                             "%u instances; the limit is %u", info->instanceCount, MAX_INSTANCES);
         as->instance_count = as->primitive_count = info->instanceCount;
         return VK_SUCCESS;
     }
     if (info->type != VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_NV)
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "as-type", "type must be TOP_LEVEL or BOTTOM_LEVEL");
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "as-type",
+                         "type must be TOP_LEVEL or BOTTOM_LEVEL");
     if (info->instanceCount)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "as-counts", "a bottom level has no instances");
     if (info->geometryCount > RTC_SLOT_GEOMETRY_MASK)
-        return rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "maxGeometryCount", "%u geometries; the limit is %u",
-                         info->geometryCount, RTC_SLOT_GEOMETRY_MASK);
+        return rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "maxGeometryCount",
+                         "%u geometries; the limit is %u", info->geometryCount, RTC_SLOT_GEOMETRY_MASK);
     as->geometry_count = info->geometryCount;
     if (info->geometryCount) {
         as->geometries = rtr_alloc(a, info->geometryCount * sizeof *as->geometries);
@@ -128,14 +142,15 @@ static VkResult fill_from_info(RtrDevice d, RtrAccelerationStructure as, const V
     }
     as->aabbs = info->geometryCount && as->geometries[0].geometryType == VK_GEOMETRY_TYPE_AABBS_NV;
     if (total > MAX_PRIMITIVES)
-        return rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "maxTriangleCount", "%llu primitives; the limit is %u",
-                         (unsigned long long)total, MAX_PRIMITIVES);
+        return rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "maxTriangleCount",
+                         "%llu primitives; the limit is %u", (unsigned long long)total, MAX_PRIMITIVES);
     as->primitive_count = (uint32_t)total;
     return VK_SUCCESS;
 }
 
 VkResult rtrCreateAccelerationStructure(RtrDevice d, const VkAccelerationStructureCreateInfoNV* info,
-                                        const VkAllocationCallbacks* allocator, RtrAccelerationStructure* pAs) {
+                                        const VkAllocationCallbacks* allocator,
+                                        RtrAccelerationStructure* pAs) {
     const VkAllocationCallbacks* a = rtr_pick(d, allocator);
     RtrAccelerationStructure as;
     VkResult r;
@@ -173,7 +188,8 @@ void rtrDestroyAccelerationStructure(RtrDevice d, RtrAccelerationStructure as,
     rtr_free(a, as);
 }
 
-void rtrGetAccelerationStructureMemoryRequirements(RtrDevice d, VkAccelerationStructureMemoryRequirementsTypeNV type,
+void rtrGetAccelerationStructureMemoryRequirements(RtrDevice d,
+                                                   VkAccelerationStructureMemoryRequirementsTypeNV type,
                                                    RtrAccelerationStructure as, VkMemoryRequirements2* out) {
     RtrScratchLayout layout;
     VkDeviceSize size = as->size;
@@ -208,17 +224,19 @@ VkResult rtrBindAccelerationStructureMemory(RtrDevice d, uint32_t count,
         if (b->heapOffset > b->heap->size || b->accelerationStructure->size > b->heap->size - b->heapOffset)
             return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "bind-range",
                              "bind %u: %llu bytes at %llu do not fit a heap of %llu", i,
-                             (unsigned long long)b->accelerationStructure->size, (unsigned long long)b->heapOffset,
-                             (unsigned long long)b->heap->size);
+                             (unsigned long long)b->accelerationStructure->size,
+                             (unsigned long long)b->heapOffset, (unsigned long long)b->heap->size);
         b->accelerationStructure->heap = b->heap;
         b->accelerationStructure->heap_offset = b->heapOffset;
     }
     return VK_SUCCESS;
 }
 
-VkResult rtrGetAccelerationStructureHandle(RtrDevice d, RtrAccelerationStructure as, size_t size, void* data) {
+VkResult rtrGetAccelerationStructureHandle(RtrDevice d, RtrAccelerationStructure as, size_t size,
+                                           void* data) {
     uint64_t base;
-    if (!as->heap) return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "not-bound", "handle of an unbound structure");
+    if (!as->heap)
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "not-bound", "handle of an unbound structure");
     if (size < sizeof base)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "handle-size", "dataSize must be 8 or more");
     base = rtr_as_base(as);
@@ -226,9 +244,11 @@ VkResult rtrGetAccelerationStructureHandle(RtrDevice d, RtrAccelerationStructure
     return VK_SUCCESS;
 }
 
-VkResult rtrGetAccelerationStructureDescriptor(RtrDevice d, RtrAccelerationStructure as, VkDescriptorBufferInfo* info) {
+VkResult rtrGetAccelerationStructureDescriptor(RtrDevice d, RtrAccelerationStructure as,
+                                               VkDescriptorBufferInfo* info) {
     if (!as->heap)
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "not-bound", "descriptor of an unbound structure");
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "not-bound",
+                         "descriptor of an unbound structure");
     info->buffer = as->heap->buffer;
     info->offset = as->heap->offset + as->heap_offset;
     info->range = RTC_AS_HEADER_QUADS * RTC_QUAD_BYTES;

@@ -51,8 +51,10 @@ VkResult rtr_bind_arrays(RtrBuild* b, uint32_t nodes_at, uint32_t slots_at) {
             info->range = RTC_AS_HEADER_QUADS * RTC_QUAD_BYTES;
         } else if (i == RTR_ARR_DST_NODES) {
             info->buffer = b->dst->heap->buffer;
-            info->offset = base + RTC_QUAD_BYTES * (RTC_AS_HEADER_QUADS + (VkDeviceSize)RTC_NODE_QUADS * nodes_at);
-            info->range = rtr_min_size(limit, base + RTC_QUAD_BYTES * (VkDeviceSize)b->slots_quad - info->offset);
+            info->offset =
+                base + RTC_QUAD_BYTES * (RTC_AS_HEADER_QUADS + (VkDeviceSize)RTC_NODE_QUADS * nodes_at);
+            info->range =
+                rtr_min_size(limit, base + RTC_QUAD_BYTES * (VkDeviceSize)b->slots_quad - info->offset);
         } else if (i == RTR_ARR_DST_SLOTS) {
             info->buffer = b->dst->heap->buffer;
             info->offset =
@@ -74,15 +76,16 @@ VkResult rtr_bind_arrays(RtrBuild* b, uint32_t nodes_at, uint32_t slots_at) {
         count++;
     }
     d->vk.UpdateDescriptorSets(d->device, count, writes, 0, NULL);
-    d->vk.CmdBindDescriptorSets(b->recorder->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, d->kernel_layout, 1, 1, &b->arrays, 0,
-                                NULL);
+    d->vk.CmdBindDescriptorSets(b->recorder->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, d->kernel_layout, 1, 1,
+                                &b->arrays, 0, NULL);
     return VK_SUCCESS;
 }
 
 static void set_kernel(RtrBuild* b, RtrKernel kernel) {
     RtrDevice d = b->device;
     d->vk.CmdBindPipeline(b->recorder->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, d->kernels[kernel]);
-    d->vk.CmdPushConstants(b->recorder->cmd, d->kernel_layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof b->push, &b->push);
+    d->vk.CmdPushConstants(b->recorder->cmd, d->kernel_layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof b->push,
+                           &b->push);
 }
 
 /* Every dispatch is followed by a barrier: the steps of a build depend on each other. */
@@ -132,7 +135,9 @@ static void sort(RtrBuild* b) {
 
 static void tree(RtrBuild* b) {
     const uint32_t groups = rtr_groups(b->primitives, RTR_GROUP);
-    const uint32_t passes = (b->push.build_flags & VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_BUILD_BIT_NV) ? 1 : ROTATION_PASSES;
+    const uint32_t passes = (b->push.build_flags & VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_BUILD_BIT_NV)
+                                ? 1
+                                : ROTATION_PASSES;
     uint32_t pass;
     rtr_dispatch(b, RTR_KERNEL_lbvh_topology, groups);
     b->push.step = passes > 1;
@@ -185,12 +190,16 @@ static VkResult check_build(RtrBuild* b, const VkAccelerationStructureInfoNV* in
     uint64_t total = 0;
     uint32_t g;
     if (!b->recorder->cmd)
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "recorder-not-begun", "build: rtrBeginRecorder first");
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "recorder-not-begun",
+                         "build: rtrBeginRecorder first");
     if (info->pNext)
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "pNext", "VkAccelerationStructureInfoNV::pNext must be NULL");
-    if (!dst || !dst->heap) return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "not-bound", "build: dst is not bound");
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "pNext",
+                         "VkAccelerationStructureInfoNV::pNext must be NULL");
+    if (!dst || !dst->heap)
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "not-bound", "build: dst is not bound");
     if (info->type != dst->type || info->flags != dst->flags)
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "as-info", "build: type or flags differ from dst's creation");
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "as-info",
+                         "build: type or flags differ from dst's creation");
     if (dst->compacted_size)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "compacted-size",
                          "build: dst was created with compactedSize, for copies only");
@@ -200,20 +209,25 @@ static VkResult check_build(RtrBuild* b, const VkAccelerationStructureInfoNV* in
     if (update && !(dst->flags & VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV))
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "update-not-allowed",
                          "update of a structure without ALLOW_UPDATE");
-    if (update && src && (src->type != dst->type || src->primitive_count != dst->primitive_count || !src->heap))
+    if (update && src &&
+        (src->type != dst->type || src->primitive_count != dst->primitive_count || !src->heap))
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "update-src", "update: src does not match dst");
     if (top) {
-        if (info->instanceCount > dst->instance_count || (update && info->instanceCount != dst->instance_count))
-            return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "as-counts", "build of %u instances; created for %u",
-                             info->instanceCount, dst->instance_count);
+        if (info->instanceCount > dst->instance_count ||
+            (update && info->instanceCount != dst->instance_count))
+            return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "as-counts",
+                             "build of %u instances; created for %u", info->instanceCount,
+                             dst->instance_count);
         if (info->instanceCount && (!b->instance_data || b->instance_offset % 16))
             return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "instance-data",
                              "instanceData missing or instanceOffset not a multiple of 16");
         b->primitives = info->instanceCount;
     } else {
-        if (info->geometryCount > dst->geometry_count || (update && info->geometryCount != dst->geometry_count))
-            return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "as-counts", "build of %u geometries; created for %u",
-                             info->geometryCount, dst->geometry_count);
+        if (info->geometryCount > dst->geometry_count ||
+            (update && info->geometryCount != dst->geometry_count))
+            return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "as-counts",
+                             "build of %u geometries; created for %u", info->geometryCount,
+                             dst->geometry_count);
         for (g = 0; g < info->geometryCount; g++) {
             uint32_t n = 0, made = 0;
             VkResult r = rtr_check_geometry(d, &info->pGeometries[g], g, &n);
@@ -222,7 +236,8 @@ static VkResult check_build(RtrBuild* b, const VkAccelerationStructureInfoNV* in
             if (info->pGeometries[g].geometryType != dst->geometries[g].geometryType || n > made ||
                 (update && (n != made || info->pGeometries[g].flags != dst->geometries[g].flags)))
                 return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "as-geometry",
-                                 "geometry %u: type, flags or count (%u) do not fit its creation (%u)", g, n, made);
+                                 "geometry %u: type, flags or count (%u) do not fit its creation (%u)", g, n,
+                                 made);
             total += n;
         }
         b->primitives = (uint32_t)total;
@@ -236,8 +251,8 @@ static VkResult check_build(RtrBuild* b, const VkAccelerationStructureInfoNV* in
 
 VkResult rtrCmdBuildAccelerationStructure(RtrRecorder recorder, const VkAccelerationStructureInfoNV* info,
                                           VkBuffer instanceData, VkDeviceSize instanceOffset, VkBool32 update,
-                                          RtrAccelerationStructure dst, RtrAccelerationStructure src, VkBuffer scratch,
-                                          VkDeviceSize scratchOffset) {
+                                          RtrAccelerationStructure dst, RtrAccelerationStructure src,
+                                          VkBuffer scratch, VkDeviceSize scratchOffset) {
     RtrBuild b;
     uint32_t g;
     bool opaque = true;
@@ -266,8 +281,10 @@ VkResult rtrCmdBuildAccelerationStructure(RtrRecorder recorder, const VkAccelera
     b.push.geometry_count = info->geometryCount;
     if (dst->type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV) b.push.flags |= RTR_BUILD_TOP;
     if (dst->aabbs) b.push.flags |= RTR_BUILD_AABBS;
-    if (info->flags & VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV) b.push.flags |= RTR_BUILD_KEEP_DEGENERATE;
-    for (g = 0; g < info->geometryCount; g++) opaque = opaque && (info->pGeometries[g].flags & VK_GEOMETRY_OPAQUE_BIT_NV);
+    if (info->flags & VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV)
+        b.push.flags |= RTR_BUILD_KEEP_DEGENERATE;
+    for (g = 0; g < info->geometryCount; g++)
+        opaque = opaque && (info->pGeometries[g].flags & VK_GEOMETRY_OPAQUE_BIT_NV);
     b.push.facts = (dst->aabbs ? RTC_FACT_AABBS : 0u) | (opaque ? RTC_FACT_ALL_OPAQUE : 0u);
     if (update) {
         rtr_update_scratch(dst->primitive_count, dst->geometry_count, &b.layout);

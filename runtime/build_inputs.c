@@ -49,14 +49,15 @@ static VkResult bind_inputs(RtrBuild* b, Window data, Window index, Window trans
         count++;
     }
     d->vk.UpdateDescriptorSets(d->device, count, writes, 0, NULL);
-    d->vk.CmdBindDescriptorSets(b->recorder->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, d->kernel_layout, 0, 1, &set, 0, NULL);
+    d->vk.CmdBindDescriptorSets(b->recorder->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, d->kernel_layout, 0, 1,
+                                &set, 0, NULL);
     return VK_SUCCESS;
 }
 
 static VkResult too_large(RtrBuild* b, const char* what, uint32_t g, VkDeviceSize bytes) {
     return rtr_error(b->device, VK_ERROR_FEATURE_NOT_PRESENT, "maxStorageBufferRange",
-                     "geometry %u: %s of %llu bytes: maxStorageBufferRange is %u", g, what, (unsigned long long)bytes,
-                     b->device->limits.maxStorageBufferRange);
+                     "geometry %u: %s of %llu bytes: maxStorageBufferRange is %u", g, what,
+                     (unsigned long long)bytes, b->device->limits.maxStorageBufferRange);
 }
 
 static uint32_t slot_flags(const VkGeometryNV* g, uint32_t index) {
@@ -73,7 +74,8 @@ static VkResult triangles(RtrBuild* b, uint32_t g, uint32_t first, uint32_t coun
     const VkDeviceSize index_size = t->indexType == VK_INDEX_TYPE_UINT16 ? 2 : 4;
     uint32_t code = 0, size = 12, component = 4;
     const bool known = rtr_vertex_format(t->vertexFormat, &code, &size, &component);
-    const VkDeviceSize vertex_bytes = known && t->vertexCount ? (t->vertexCount - 1) * t->vertexStride + size : 0;
+    const VkDeviceSize vertex_bytes =
+        known && t->vertexCount ? (t->vertexCount - 1) * t->vertexStride + size : 0;
     VkDeviceSize bytes_each = indexed ? 3 * index_size : 3 * t->vertexStride;
     uint32_t chunk = bytes_each ? (uint32_t)rtr_min_size(limit / bytes_each, count) : count;
     uint32_t at;
@@ -89,18 +91,21 @@ static VkResult triangles(RtrBuild* b, uint32_t g, uint32_t first, uint32_t coun
         b->push.flags &= ~RTR_BUILD_HAS_TRANSFORM;
         if (indexed) {
             VkDeviceSize begin = t->indexOffset + at * bytes_each;
-            data = window(t->vertexData, t->vertexOffset, t->vertexOffset + vertex_bytes, &b->push.data_offset);
+            data =
+                window(t->vertexData, t->vertexOffset, t->vertexOffset + vertex_bytes, &b->push.data_offset);
             index = window(t->indexData, begin, begin + n * bytes_each, &b->push.index_offset);
             b->push.vertex_count = t->vertexCount;
             b->push.index_type = t->indexType == VK_INDEX_TYPE_UINT16 ? RTR_INDEX_16 : RTR_INDEX_32;
         } else {
             VkDeviceSize begin = t->vertexOffset + at * bytes_each;
-            data = window(t->vertexData, begin, begin + (3 * n - 1) * t->vertexStride + size, &b->push.data_offset);
+            data = window(t->vertexData, begin, begin + (3 * n - 1) * t->vertexStride + size,
+                          &b->push.data_offset);
             b->push.vertex_count = 3 * n;
             b->push.index_type = RTR_INDEX_NONE;
         }
         if (t->transformData) {
-            transform = window(t->transformData, t->transformOffset, t->transformOffset + 48, &b->push.transform_offset);
+            transform = window(t->transformData, t->transformOffset, t->transformOffset + 48,
+                               &b->push.transform_offset);
             b->push.flags |= RTR_BUILD_HAS_TRANSFORM;
         }
         b->push.count = n;
@@ -109,14 +114,16 @@ static VkResult triangles(RtrBuild* b, uint32_t g, uint32_t first, uint32_t coun
         b->push.geometry = slot_flags(&b->geometries[g], g);
         b->push.data_stride = (uint32_t)t->vertexStride;
         b->push.vertex_format = code;
-        if ((r = bind_inputs(b, data, index, transform)) != VK_SUCCESS || (r = emit(b)) != VK_SUCCESS) return r;
+        if ((r = bind_inputs(b, data, index, transform)) != VK_SUCCESS || (r = emit(b)) != VK_SUCCESS)
+            return r;
     }
     return VK_SUCCESS;
 }
 
 /* AABBs and instances: records of a fixed stride. */
-static VkResult records(RtrBuild* b, VkBuffer buffer, VkDeviceSize offset, VkDeviceSize stride, VkDeviceSize size,
-                        uint32_t geometry, uint32_t first, uint32_t count, uint32_t most, RtrInputFunction emit) {
+static VkResult records(RtrBuild* b, VkBuffer buffer, VkDeviceSize offset, VkDeviceSize stride,
+                        VkDeviceSize size, uint32_t geometry, uint32_t first, uint32_t count, uint32_t most,
+                        RtrInputFunction emit) {
     const VkDeviceSize limit = b->device->limits.maxStorageBufferRange - 1024u;
     uint32_t chunk = stride ? (uint32_t)rtr_min_size(limit / stride, count) : count;
     uint32_t at;
@@ -141,7 +148,8 @@ VkResult rtr_for_each_input(RtrBuild* b, RtrInputFunction emit) {
     uint32_t g, first = 0;
     if (b->dst->type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV) {
         if (!b->primitives) return VK_SUCCESS;
-        return records(b, b->instance_data, b->instance_offset, 64, 64, 0, 0, b->primitives, b->slot_window, emit);
+        return records(b, b->instance_data, b->instance_offset, 64, 64, 0, 0, b->primitives, b->slot_window,
+                       emit);
     }
     for (g = 0; g < b->geometry_count; g++) {
         const VkGeometryNV* geometry = &b->geometries[g];
@@ -156,8 +164,8 @@ VkResult rtr_for_each_input(RtrBuild* b, RtrInputFunction emit) {
             if (!boxes->aabbData)
                 return rtr_error(b->device, VK_ERROR_VALIDATION_FAILED_EXT, "geometry-data",
                                  "geometry %u: aabbData is VK_NULL_HANDLE", g);
-            r = records(b, boxes->aabbData, boxes->offset, boxes->stride, 24, slot_flags(geometry, g), first, count,
-                        count, emit);
+            r = records(b, boxes->aabbData, boxes->offset, boxes->stride, 24, slot_flags(geometry, g), first,
+                        count, count, emit);
         }
         if (r != VK_SUCCESS) return r;
         first += count;

@@ -32,7 +32,8 @@ static VkResult bind_copy(RtrRecorder rec, RtrHeap heap, uint32_t array, VkBuffe
         count = 3;
     }
     d->vk.UpdateDescriptorSets(d->device, count, writes, 0, NULL);
-    d->vk.CmdBindDescriptorSets(rec->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, d->kernel_layout, 0, 2, sets, 0, NULL);
+    d->vk.CmdBindDescriptorSets(rec->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, d->kernel_layout, 0, 2, sets, 0,
+                                NULL);
     return VK_SUCCESS;
 }
 
@@ -44,7 +45,8 @@ static void dispatch(RtrRecorder rec, RtrKernel kernel, const struct RtrBuildPus
                       rtr_groups(groups, RTC_MAX_GROUPS_X), 1);
 }
 
-VkResult rtrCmdCopyAccelerationStructure(RtrRecorder rec, RtrAccelerationStructure dst, RtrAccelerationStructure src,
+VkResult rtrCmdCopyAccelerationStructure(RtrRecorder rec, RtrAccelerationStructure dst,
+                                         RtrAccelerationStructure src,
                                          VkCopyAccelerationStructureModeNV mode) {
     RtrDevice d = rec->device;
     const uint32_t window = d->limits.maxStorageBufferRange / RTC_QUAD_BYTES / 16u * 16u;
@@ -53,9 +55,11 @@ VkResult rtrCmdCopyAccelerationStructure(RtrRecorder rec, RtrAccelerationStructu
     uint32_t quads, at;
     VkResult r;
     if (!rec->cmd)
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "recorder-not-begun", "copy: rtrBeginRecorder first");
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "recorder-not-begun",
+                         "copy: rtrBeginRecorder first");
     if (!compact && mode != VK_COPY_ACCELERATION_STRUCTURE_MODE_CLONE_NV)
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "copy-mode", "copy mode %d: CLONE or COMPACT", (int)mode);
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "copy-mode", "copy mode %d: CLONE or COMPACT",
+                         (int)mode);
     if (!dst || !src || dst == src || !dst->heap || dst->heap != src->heap || dst->type != src->type)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "copy",
                          "copy: two different structures of one type, bound to the same heap, are needed");
@@ -83,18 +87,21 @@ VkResult rtrCmdCopyAccelerationStructure(RtrRecorder rec, RtrAccelerationStructu
 }
 
 VkResult rtrCmdWriteAccelerationStructuresProperties(RtrRecorder rec, uint32_t count,
-                                                     const RtrAccelerationStructure* structures, VkQueryType type,
-                                                     VkBuffer dst, VkDeviceSize offset) {
+                                                     const RtrAccelerationStructure* structures,
+                                                     VkQueryType type, VkBuffer dst, VkDeviceSize offset) {
     RtrDevice d = rec->device;
     uint32_t i;
     if (!rec->cmd)
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "recorder-not-begun", "properties: rtrBeginRecorder first");
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "recorder-not-begun",
+                         "properties: rtrBeginRecorder first");
     if (type != VK_QUERY_TYPE_ACCELERATION_STRUCTURE_COMPACTED_SIZE_NV &&
         type != VK_QUERY_TYPE_ACCELERATION_STRUCTURE_COMPACTED_SIZE_KHR)
         return rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "query-type",
-                         "query type %d: only VK_QUERY_TYPE_ACCELERATION_STRUCTURE_COMPACTED_SIZE_NV", (int)type);
+                         "query type %d: only VK_QUERY_TYPE_ACCELERATION_STRUCTURE_COMPACTED_SIZE_NV",
+                         (int)type);
     if (!dst || offset % 8)
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "query-buffer", "dstBuffer missing, or dstOffset not a multiple of 8");
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "query-buffer",
+                         "dstBuffer missing, or dstOffset not a multiple of 8");
     for (i = 0; i < count; i++) {
         const RtrAccelerationStructure as = structures[i];
         const VkDeviceSize at = offset + 8ull * i, begin = at / 256 * 256;

@@ -47,7 +47,8 @@ static VkResult create_kernels(RtrDevice d, VkPipelineCache cache, const VkAlloc
         module.codeSize = code->bytes;
         module.pCode = code->words;
         r = d->vk.CreateShaderModule(d->device, &module, a, &handle);
-        if (r != VK_SUCCESS) return rtr_error(d, r, "kernel", "kernel '%s': vkCreateShaderModule failed", code->name);
+        if (r != VK_SUCCESS)
+            return rtr_error(d, r, "kernel", "kernel '%s': vkCreateShaderModule failed", code->name);
         info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
         info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
         info.stage.module = handle;
@@ -56,12 +57,14 @@ static VkResult create_kernels(RtrDevice d, VkPipelineCache cache, const VkAlloc
         info.layout = d->kernel_layout;
         r = d->vk.CreateComputePipelines(d->device, cache, 1, &info, a, &d->kernels[k]);
         d->vk.DestroyShaderModule(d->device, handle, a);
-        if (r != VK_SUCCESS) return rtr_error(d, r, "kernel", "kernel '%s': vkCreateComputePipelines failed", code->name);
+        if (r != VK_SUCCESS)
+            return rtr_error(d, r, "kernel", "kernel '%s': vkCreateComputePipelines failed", code->name);
     }
     return VK_SUCCESS;
 }
 
-VkResult rtrCreateDevice(const RtrDeviceCreateInfo* info, const VkAllocationCallbacks* allocator, RtrDevice* pDevice) {
+VkResult rtrCreateDevice(const RtrDeviceCreateInfo* info, const VkAllocationCallbacks* allocator,
+                         RtrDevice* pDevice) {
     VkPhysicalDeviceProperties2 properties = {.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2};
     const char* missing = NULL;
     RtrDevice d;
@@ -92,17 +95,20 @@ VkResult rtrCreateDevice(const RtrDeviceCreateInfo* info, const VkAllocationCall
     }
     if (!rtr_load_instance_table(d->instance, info->pfnGetInstanceProcAddr, &d->vki, &missing) ||
         !rtr_load_device_table(&d->vki, d->device, &d->vk, &missing)) {
-        r = rtr_error(d, VK_ERROR_INITIALIZATION_FAILED, "entry-point", "Vulkan entry point %s is missing", missing);
+        r = rtr_error(d, VK_ERROR_INITIALIZATION_FAILED, "entry-point", "Vulkan entry point %s is missing",
+                      missing);
         goto fail;
     }
-    r = rtrGetPhysicalDeviceSupport(d->instance, d->physical_device, info->pfnGetInstanceProcAddr, &d->support);
+    r = rtrGetPhysicalDeviceSupport(d->instance, d->physical_device, info->pfnGetInstanceProcAddr,
+                                    &d->support);
     if (r != VK_SUCCESS) goto fail;
     if (!d->support.supported) {
         for (i = 0; i < d->support.requirementCount; i++) {
             const RtrRequirement* q = &d->support.requirements[i];
             if (!q->met)
-                rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "unsupported-device", "%s: rtc needs %llu, the device has %llu",
-                          q->name, (unsigned long long)q->required, (unsigned long long)q->available);
+                rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "unsupported-device",
+                          "%s: rtc needs %llu, the device has %llu", q->name, (unsigned long long)q->required,
+                          (unsigned long long)q->available);
         }
         r = VK_ERROR_FEATURE_NOT_PRESENT;
         goto fail;

@@ -5,11 +5,11 @@ bool rtr_load_instance_table(VkInstance instance, PFN_vkGetInstanceProcAddr get,
                              const char** missing) {
     /* ISO C has no conversion from function pointer to function pointer through void*;
      * a cast between function pointer types is well defined. */
-#define X(name)                                                    \
-    table->name = (PFN_vk##name)get(instance, "vk" #name);         \
-    if (!table->name) {                                            \
-        *missing = "vk" #name;                                     \
-        return false;                                              \
+#define X(name)                                            \
+    table->name = (PFN_vk##name)get(instance, "vk" #name); \
+    if (!table->name) {                                    \
+        *missing = "vk" #name;                             \
+        return false;                                      \
     }
     RTR_INSTANCE_FUNCTIONS(X)
 #undef X
@@ -18,11 +18,11 @@ bool rtr_load_instance_table(VkInstance instance, PFN_vkGetInstanceProcAddr get,
 
 bool rtr_load_device_table(const RtrInstanceTable* instance, VkDevice device, RtrDeviceTable* table,
                            const char** missing) {
-#define X(name)                                                              \
+#define X(name)                                                                  \
     table->name = (PFN_vk##name)instance->GetDeviceProcAddr(device, "vk" #name); \
-    if (!table->name) {                                                      \
-        *missing = "vk" #name;                                               \
-        return false;                                                        \
+    if (!table->name) {                                                          \
+        *missing = "vk" #name;                                                   \
+        return false;                                                            \
     }
     RTR_DEVICE_FUNCTIONS(X)
 #undef X

@@ -16,9 +16,10 @@ VkResult rtrCreateHeap(RtrDevice d, const RtrHeapCreateInfo* info, const VkAlloc
                          info->buffer ? "given" : "missing", (unsigned long long)info->offset,
                          (unsigned long long)info->size);
     if (info->size > d->support.maxHeapSizeTexel)
-        return rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "heap-size",
-                         "heap of %llu bytes: maxTexelBufferElements allows %llu (address mode would lift this)",
-                         (unsigned long long)info->size, (unsigned long long)d->support.maxHeapSizeTexel);
+        return rtr_error(
+            d, VK_ERROR_FEATURE_NOT_PRESENT, "heap-size",
+            "heap of %llu bytes: maxTexelBufferElements allows %llu (address mode would lift this)",
+            (unsigned long long)info->size, (unsigned long long)d->support.maxHeapSizeTexel);
     h = rtr_alloc(a, sizeof *h);
     if (!h) return VK_ERROR_OUT_OF_HOST_MEMORY;
     h->device = d;
@@ -53,14 +54,16 @@ void rtrDestroyHeap(RtrDevice d, RtrHeap heap, const VkAllocationCallbacks* allo
 VkResult rtrCmdInitializeHeap(RtrRecorder recorder, RtrHeap heap) {
     RtrDevice d = recorder->device;
     if (!recorder->cmd)
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "recorder-not-begun", "rtrCmdInitializeHeap: begin first");
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "recorder-not-begun",
+                         "rtrCmdInitializeHeap: begin first");
     d->vk.CmdFillBuffer(recorder->cmd, heap->buffer, heap->offset, RTC_AS_ALIGNMENT, 0);
     rtr_barrier(recorder, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT,
                 VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_READ_BIT);
     return VK_SUCCESS;
 }
 
-VkResult rtrAllocateHeapRange(RtrHeap heap, VkDeviceSize size, VkDeviceSize alignment, VkDeviceSize* pOffset) {
+VkResult rtrAllocateHeapRange(RtrHeap heap, VkDeviceSize size, VkDeviceSize alignment,
+                              VkDeviceSize* pOffset) {
     VkDeviceSize at = RTC_AS_ALIGNMENT; /* the null structure lies before */
     uint32_t i;
     if (alignment < RTC_AS_ALIGNMENT) alignment = RTC_AS_ALIGNMENT;
@@ -102,5 +105,6 @@ void rtrFreeHeapRange(RtrHeap heap, VkDeviceSize offset) {
             return;
         }
     }
-    rtr_warning(heap->device, "heap-free", "rtrFreeHeapRange: no range starts at %llu", (unsigned long long)offset);
+    rtr_warning(heap->device, "heap-free", "rtrFreeHeapRange: no range starts at %llu",
+                (unsigned long long)offset);
 }

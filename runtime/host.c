@@ -31,8 +31,8 @@ const VkAllocationCallbacks* rtr_pick(RtrDevice device, const VkAllocationCallba
     return device && device->has_allocator ? &device->allocator : NULL;
 }
 
-static void send(RtrDevice device, VkDebugUtilsMessageSeverityFlagBitsEXT severity, const char* id, const char* format,
-                 va_list arguments) {
+static void send(RtrDevice device, VkDebugUtilsMessageSeverityFlagBitsEXT severity, const char* id,
+                 const char* format, va_list arguments) {
     char text[1024];
     VkDebugUtilsMessengerCallbackDataEXT data;
     if (!device || !device->message_callback || !(device->message_severities & severity) ||

@@ -12,10 +12,10 @@
 #include "rtc/runtime.h"
 
 /* ---- Entry points: everything the runtime calls, loaded by name --------------- */
-#define RTR_INSTANCE_FUNCTIONS(X)     \
-    X(GetPhysicalDeviceProperties2)   \
-    X(GetPhysicalDeviceFeatures2)     \
-    X(GetPhysicalDeviceFormatProperties) \
+#define RTR_INSTANCE_FUNCTIONS(X)         \
+    X(GetPhysicalDeviceProperties2)       \
+    X(GetPhysicalDeviceFeatures2)         \
+    X(GetPhysicalDeviceFormatProperties)  \
     X(EnumerateDeviceExtensionProperties) \
     X(GetDeviceProcAddr)
 
@@ -96,7 +96,7 @@ typedef enum RtrKernel {
 #define X(name) RTR_KERNEL_##name,
     RTR_KERNELS(X)
 #undef X
-    RTR_KERNEL_COUNT
+        RTR_KERNEL_COUNT
 } RtrKernel;
 
 typedef struct RtrKernelCode {
@@ -237,8 +237,11 @@ const VkAllocationCallbacks* rtr_pick(RtrDevice device, const VkAllocationCallba
 #define RTR_PRINTF(f, a)
 #endif
 /* Sends an error with a stable name through the messenger and returns `result`. */
-VkResult rtr_error(RtrDevice device, VkResult result, const char* id, const char* format, ...) RTR_PRINTF(4, 5);
+VkResult rtr_error(RtrDevice device, VkResult result, const char* id, const char* format, ...)
+    RTR_PRINTF(4, 5);
 void rtr_warning(RtrDevice device, const char* id, const char* format, ...) RTR_PRINTF(3, 4);
+
+VkResult rtr_not_begun(RtrRecorder recorder, const char* function);
 
 /* ---- Recording helpers ---------------------------------------------------------------- */
 VkResult rtr_allocate_set(RtrRecorder recorder, VkDescriptorSetLayout layout, VkDescriptorSet* set);
@@ -251,7 +254,9 @@ static inline VkDeviceSize rtr_align(VkDeviceSize value, VkDeviceSize alignment)
     return (value + alignment - 1) / alignment * alignment;
 }
 static inline VkDeviceSize rtr_min_size(VkDeviceSize a, VkDeviceSize b) { return a < b ? a : b; }
-static inline uint32_t rtr_groups(uint64_t lanes, uint32_t group) { return (uint32_t)((lanes + group - 1) / group); }
+static inline uint32_t rtr_groups(uint64_t lanes, uint32_t group) {
+    return (uint32_t)((lanes + group - 1) / group);
+}
 
 /* Scratch of a build: offset and size of each RTR_ARR_* array (0 size: of the destination). */
 typedef struct RtrScratchLayout {
@@ -285,10 +290,11 @@ typedef struct RtrModule {
     RtcModuleGroup* groups;
     char* json;
     /* Descriptors the module declares, by kind, and push-constant bytes. */
-    uint32_t storage_buffers, uniform_buffers, sampled_images, storage_images, samplers, input_attachments, total;
+    uint32_t storage_buffers, uniform_buffers, sampled_images, storage_images, samplers, input_attachments,
+        total;
 } RtrModule;
-VkResult rtr_parse_module(RtrDevice device, const uint32_t* code, size_t size, const VkAllocationCallbacks* allocator,
-                          RtrModule* module);
+VkResult rtr_parse_module(RtrDevice device, const uint32_t* code, size_t size,
+                          const VkAllocationCallbacks* allocator, RtrModule* module);
 void rtr_free_module(const VkAllocationCallbacks* allocator, RtrModule* module);
 
 /* Layout bindings of the reserved set that `used` names, at `base`; returns their number. */

@@ -7,7 +7,8 @@ uint32_t rtrGetLaunchCount(RtrRecorder r) { return r->launch_count; }
 
 VkResult rtrGetLaunchErrorLocation(RtrRecorder r, uint32_t index, VkDescriptorBufferInfo* info) {
     if (index >= r->launch_count)
-        return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "launch-index", "launch %u of %u", index, r->launch_count);
+        return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "launch-index", "launch %u of %u", index,
+                         r->launch_count);
     info->buffer = r->control;
     info->offset = r->launches[index].offset;
     info->range = r->launches[index].size;
@@ -27,36 +28,50 @@ VkResult rtrDecodeLaunchError(const uint32_t* words, RtrLaunchError* e) {
 void rtrFormatLaunchError(const RtrLaunchError* e, char* text, size_t size) {
     char what[160];
     switch (e->code) {
-        case RTC_LAUNCH_ERROR_NONE: snprintf(what, sizeof what, "no error"); break;
+        case RTC_LAUNCH_ERROR_NONE:
+            snprintf(what, sizeof what, "no error");
+            break;
         case RTC_LAUNCH_ERROR_RECURSION_DEPTH:
-            snprintf(what, sizeof what, "a trace below the pipeline's recursion limit was dropped (rtc --max-recursion-depth)");
+            snprintf(what, sizeof what,
+                     "a trace below the pipeline's recursion limit was dropped (rtc --max-recursion-depth)");
             break;
         case RTC_LAUNCH_ERROR_CALLABLE_DEPTH:
-            snprintf(what, sizeof what, "a callable below the pipeline's depth limit was dropped (rtc --max-callable-depth)");
+            snprintf(what, sizeof what,
+                     "a callable below the pipeline's depth limit was dropped (rtc --max-callable-depth)");
             break;
         case RTC_LAUNCH_ERROR_BAD_HANDLE:
-            snprintf(what, sizeof what, "an SBT record holds no shader of this pipeline (word read: 0x%08x)", e->detail[0]);
+            snprintf(what, sizeof what, "an SBT record holds no shader of this pipeline (word read: 0x%08x)",
+                     e->detail[0]);
             break;
         case RTC_LAUNCH_ERROR_ABI:
-            snprintf(what, sizeof what, "an acceleration structure is not of this ABI version, or no structure (word read: 0x%08x)",
-                     e->detail[0]);
+            snprintf(
+                what, sizeof what,
+                "an acceleration structure is not of this ABI version, or no structure (word read: 0x%08x)",
+                e->detail[0]);
             break;
         case RTC_LAUNCH_ERROR_ASSUMPTION:
-            snprintf(what, sizeof what, "the scene breaks an assumption the module was compiled with (fact 0x%x, first offender %u)",
-                     e->detail[0], e->detail[1]);
+            snprintf(
+                what, sizeof what,
+                "the scene breaks an assumption the module was compiled with (fact 0x%x, first offender %u)",
+                e->detail[0], e->detail[1]);
             break;
         case RTC_LAUNCH_ERROR_UNFINISHED:
-            snprintf(what, sizeof what, "up to %u lanes were not finished when the rounds ran out (rtrCmdSetLaunchLimits)",
+            snprintf(what, sizeof what,
+                     "up to %u lanes were not finished when the rounds ran out (rtrCmdSetLaunchLimits)",
                      e->detail[0]);
             break;
-        case RTC_LAUNCH_ERROR_STACK: snprintf(what, sizeof what, "a traversal or word stack overflowed (internal)"); break;
-        default: snprintf(what, sizeof what, "unknown launch error %u", e->code); break;
+        case RTC_LAUNCH_ERROR_STACK:
+            snprintf(what, sizeof what, "a traversal or word stack overflowed (internal)");
+            break;
+        default:
+            snprintf(what, sizeof what, "unknown launch error %u", e->code);
+            break;
     }
     if (e->code == RTC_LAUNCH_ERROR_NONE || e->code == RTC_LAUNCH_ERROR_UNFINISHED) {
         snprintf(text, size, "%s", what);
     } else {
-        snprintf(text, size, "%s; %u events, the first at launch id (%u, %u, %u)", what, e->count, e->launchId[0],
-                 e->launchId[1], e->launchId[2]);
+        snprintf(text, size, "%s; %u events, the first at launch id (%u, %u, %u)", what, e->count,
+                 e->launchId[0], e->launchId[1], e->launchId[2]);
     }
 }
 
@@ -88,7 +103,8 @@ VkResult rtrCmdProbeFloat(RtrRecorder r, VkBuffer dstBuffer, VkDeviceSize dstOff
     VkWriteDescriptorSet write = {.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET};
     VkResult result;
     if (!r->cmd || dstOffset % 256)
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "probe", "rtrCmdProbeFloat: begin the recorder; dstOffset a multiple of 256");
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "probe",
+                         "rtrCmdProbeFloat: begin the recorder; dstOffset a multiple of 256");
     if ((result = rtr_allocate_set(r, d->array_layout, &write.dstSet)) != VK_SUCCESS) return result;
     info.buffer = dstBuffer;
     info.offset = dstOffset;
@@ -107,7 +123,8 @@ VkResult rtrCmdProbeFloat(RtrRecorder r, VkBuffer dstBuffer, VkDeviceSize dstOff
     push.data_offset = 0x7fc00000u;
     push.data_stride = float_bits(1.0f / 16777216);
     d->vk.CmdBindPipeline(r->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, d->kernels[RTR_KERNEL_probe]);
-    d->vk.CmdBindDescriptorSets(r->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, d->kernel_layout, 1, 1, &write.dstSet, 0, NULL);
+    d->vk.CmdBindDescriptorSets(r->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, d->kernel_layout, 1, 1, &write.dstSet,
+                                0, NULL);
     d->vk.CmdPushConstants(r->cmd, d->kernel_layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof push, &push);
     d->vk.CmdDispatch(r->cmd, 1, 1, 1);
     return VK_SUCCESS;

@@ -71,8 +71,8 @@ typedef enum IdKind {
     ID_STORAGE_IMAGE,
     ID_INPUT_ATTACHMENT,
     ID_COMBINED,
-    ID_ARRAY,   /* a: element, b: length */
-    ID_POINTER  /* a: pointee, b: storage class */
+    ID_ARRAY,  /* a: element, b: length */
+    ID_POINTER /* a: pointee, b: storage class */
 } IdKind;
 
 typedef struct Id {
@@ -92,22 +92,36 @@ static void count_variable(RtrModule* m, const Id* ids, uint32_t bound, uint32_t
     }
     if (type >= bound) return;
     switch (ids[pointer_type].b) {
-        case 12: counter = &m->storage_buffers; break;
-        case 2: counter = ids[type].buffer_block ? &m->storage_buffers : &m->uniform_buffers; break;
+        case 12:
+            counter = &m->storage_buffers;
+            break;
+        case 2:
+            counter = ids[type].buffer_block ? &m->storage_buffers : &m->uniform_buffers;
+            break;
         case 0:
             switch (ids[type].kind) {
-                case ID_SAMPLER: counter = &m->samplers; break;
-                case ID_SAMPLED: counter = &m->sampled_images; break;
-                case ID_STORAGE_IMAGE: counter = &m->storage_images; break;
-                case ID_INPUT_ATTACHMENT: counter = &m->input_attachments; break;
+                case ID_SAMPLER:
+                    counter = &m->samplers;
+                    break;
+                case ID_SAMPLED:
+                    counter = &m->sampled_images;
+                    break;
+                case ID_STORAGE_IMAGE:
+                    counter = &m->storage_images;
+                    break;
+                case ID_INPUT_ATTACHMENT:
+                    counter = &m->input_attachments;
+                    break;
                 case ID_COMBINED:
                     m->samplers += elements;
                     counter = &m->sampled_images;
                     break;
-                default: break;
+                default:
+                    break;
             }
             break;
-        default: break;
+        default:
+            break;
     }
     if (!counter) return;
     *counter += elements;
@@ -123,7 +137,8 @@ static void walk_types(RtrModule* m, Id* ids, uint32_t bound, const uint32_t* co
         if (length == 0 || length > words - at) return;
         at += length;
         if (op == 54) return; /* OpFunction: no declarations after it */
-        if (op == 71 && length >= 3 && w[1] < bound && w[2] == 3) ids[w[1]].buffer_block = 1; /* OpDecorate BufferBlock */
+        if (op == 71 && length >= 3 && w[1] < bound && w[2] == 3)
+            ids[w[1]].buffer_block = 1; /* OpDecorate BufferBlock */
         if (length < 2) continue;
         if (op == 43) { /* OpConstant */
             if (length >= 4 && w[2] < bound) ids[w[2]].kind = ID_CONSTANT, ids[w[2]].a = w[3];
@@ -139,8 +154,12 @@ static void walk_types(RtrModule* m, Id* ids, uint32_t bound, const uint32_t* co
                 if (length < 8) break;
                 ids[w[1]].kind = w[3] == 6 ? ID_INPUT_ATTACHMENT : w[7] == 2 ? ID_STORAGE_IMAGE : ID_SAMPLED;
                 break;
-            case 26: ids[w[1]].kind = ID_SAMPLER; break;
-            case 27: ids[w[1]].kind = ID_COMBINED; break;
+            case 26:
+                ids[w[1]].kind = ID_SAMPLER;
+                break;
+            case 27:
+                ids[w[1]].kind = ID_COMBINED;
+                break;
             case 28: /* OpTypeArray */
                 if (length < 4) break;
                 ids[w[1]].kind = ID_ARRAY;
@@ -153,21 +172,25 @@ static void walk_types(RtrModule* m, Id* ids, uint32_t bound, const uint32_t* co
                 ids[w[1]].a = w[2];
                 ids[w[1]].b = 1;
                 break;
-            case 30: ids[w[1]].kind = ID_STRUCT; break;
+            case 30:
+                ids[w[1]].kind = ID_STRUCT;
+                break;
             case 32: /* OpTypePointer */
                 if (length < 4) break;
                 ids[w[1]].kind = ID_POINTER;
                 ids[w[1]].a = w[3];
                 ids[w[1]].b = w[2];
                 break;
-            default: break;
+            default:
+                break;
         }
     }
 }
 
 /* ---- Reflection ----------------------------------------------------------------------- */
 
-static VkResult collect(RtrDevice d, const uint32_t* code, size_t words, Chunk* chunks, uint32_t* count, size_t* bytes) {
+static VkResult collect(RtrDevice d, const uint32_t* code, size_t words, Chunk* chunks, uint32_t* count,
+                        size_t* bytes) {
     const size_t prefix = sizeof k_prefix - 1;
     uint32_t found = 0, i;
     size_t at;
@@ -183,9 +206,9 @@ static VkResult collect(RtrDevice d, const uint32_t* code, size_t words, Chunk* 
             if (!end) return damaged(d, "an OpString does not end");
             if ((size_t)(end - text) > prefix && memcmp(text, k_prefix, prefix) == 0) {
                 text += prefix;
-                if (!number(&text, end, &index) || text == end || *text++ != '/' || !number(&text, end, &total) ||
-                    text == end || *text++ != ':' || index >= total || total > MAX_CHUNKS ||
-                    (*count && total != *count) || chunks[index].text)
+                if (!number(&text, end, &index) || text == end || *text++ != '/' ||
+                    !number(&text, end, &total) || text == end || *text++ != ':' || index >= total ||
+                    total > MAX_CHUNKS || (*count && total != *count) || chunks[index].text)
                     return damaged(d, "its reflection is damaged");
                 *count = total;
                 chunks[index].text = text;
@@ -196,22 +219,25 @@ static VkResult collect(RtrDevice d, const uint32_t* code, size_t words, Chunk* 
         }
         at += length;
     }
-    if (!found) return damaged(d, "it carries no rtc reflection (not linked by rtc, or its strings were stripped)");
+    if (!found)
+        return damaged(d, "it carries no rtc reflection (not linked by rtc, or its strings were stripped)");
     for (i = 0; i < *count; i++)
         if (!chunks[i].text) return damaged(d, "a part of its reflection is missing");
     return VK_SUCCESS;
 }
 
-static VkResult unpack(RtrDevice d, const uint8_t* bytes, size_t size, const VkAllocationCallbacks* a, RtrModule* m) {
+static VkResult unpack(RtrDevice d, const uint8_t* bytes, size_t size, const VkAllocationCallbacks* a,
+                       RtrModule* m) {
     RtcModuleHeader* h = &m->header;
     size_t groups;
     if (size < sizeof *h) return damaged(d, "its reflection is too short");
     memcpy(h, bytes, sizeof *h);
     if (h->magic != RTC_MODULE_MAGIC) return damaged(d, "its reflection has another magic number");
     if (h->abi_version != RTC_ABI_VERSION)
-        return rtr_error(d, VK_ERROR_INCOMPATIBLE_DRIVER, "abi-version",
-                         "module has rtc ABI version %u, this runtime %u: link it again with the matching compiler",
-                         h->abi_version, RTC_ABI_VERSION);
+        return rtr_error(
+            d, VK_ERROR_INCOMPATIBLE_DRIVER, "abi-version",
+            "module has rtc ABI version %u, this runtime %u: link it again with the matching compiler",
+            h->abi_version, RTC_ABI_VERSION);
     groups = (size_t)h->group_count * sizeof(RtcModuleGroup);
     if (h->group_count > (1u << 24) || groups > size - sizeof *h || h->json_bytes > size - sizeof *h - groups)
         return damaged(d, "its reflection is shorter than its header says");
@@ -238,7 +264,8 @@ VkResult rtr_parse_module(RtrDevice d, const uint32_t* code, size_t size, const 
     size_t encoded = 0, used = 0;
     VkResult r;
     memset(m, 0, sizeof *m);
-    if (!code || words < 5 || size % 4 || code[0] != SPIRV_MAGIC) return damaged(d, "not SPIR-V of this machine's byte order");
+    if (!code || words < 5 || size % 4 || code[0] != SPIRV_MAGIC)
+        return damaged(d, "not SPIR-V of this machine's byte order");
     if (code[3] == 0 || code[3] > (1u << 24)) return damaged(d, "impossible id bound");
     chunks = rtr_alloc(a, (MAX_CHUNKS + 1) * sizeof *chunks);
     ids = rtr_alloc(a, code[3] * sizeof *ids);

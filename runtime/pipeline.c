@@ -2,9 +2,11 @@
 #include "internal.h"
 
 static const VkDescriptorType k_reserved_types[RTC_BINDING_COUNT] = {
-    VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER_DYNAMIC, VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
-    VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,         VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,       VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
-    VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,         VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,       VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
+    VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER_DYNAMIC, VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER,
+    VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,         VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
+    VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,         VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
+    VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,         VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
+    VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
 };
 
 uint32_t rtr_reserved_bindings(uint32_t used, uint32_t base, VkDescriptorSetLayoutBinding* bindings) {
@@ -47,11 +49,12 @@ VkResult rtrGetReservedBindings(RtrDevice d, const uint32_t* pCode, size_t codeS
 static VkResult check_limit(RtrDevice d, const char* name, uint32_t used, uint32_t limit) {
     if (used <= limit) return VK_SUCCESS;
     return rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, name,
-                     "%s is %u; the linked module uses %u (all ray tracing stages are one compute stage now)", name,
-                     limit, used);
+                     "%s is %u; the linked module uses %u (all ray tracing stages are one compute stage now)",
+                     name, limit, used);
 }
 
-static VkResult check_limits(RtrDevice d, const RtrModule* m, const RtrTraceOptions* o, uint32_t sets, uint32_t push) {
+static VkResult check_limits(RtrDevice d, const RtrModule* m, const RtrTraceOptions* o, uint32_t sets,
+                             uint32_t push) {
     const VkPhysicalDeviceLimits* l = &d->limits;
     VkResult r;
     if ((r = check_limit(d, "maxPerStageDescriptorStorageBuffers", m->storage_buffers,
@@ -62,11 +65,13 @@ static VkResult check_limits(RtrDevice d, const RtrModule* m, const RtrTraceOpti
                          l->maxPerStageDescriptorSampledImages)) ||
         (r = check_limit(d, "maxPerStageDescriptorStorageImages", m->storage_images,
                          l->maxPerStageDescriptorStorageImages)) ||
-        (r = check_limit(d, "maxPerStageDescriptorSamplers", m->samplers, l->maxPerStageDescriptorSamplers)) ||
+        (r = check_limit(d, "maxPerStageDescriptorSamplers", m->samplers,
+                         l->maxPerStageDescriptorSamplers)) ||
         (r = check_limit(d, "maxPerStageResources", m->total, l->maxPerStageResources)) ||
         (r = check_limit(d, "maxBoundDescriptorSets", sets, l->maxBoundDescriptorSets)) ||
         (r = check_limit(d, "maxPushConstantsSize", push, l->maxPushConstantsSize)) ||
-        (r = check_limit(d, "maxComputeWorkGroupInvocations", o->workgroupSize, l->maxComputeWorkGroupInvocations)) ||
+        (r = check_limit(d, "maxComputeWorkGroupInvocations", o->workgroupSize,
+                         l->maxComputeWorkGroupInvocations)) ||
         (r = check_limit(d, "maxComputeWorkGroupSize[0]", o->workgroupSize, l->maxComputeWorkGroupSize[0])) ||
         (r = check_limit(d, "maxComputeSharedMemorySize", o->sharedStack * o->workgroupSize * 4,
                          l->maxComputeSharedMemorySize)))
@@ -74,7 +79,8 @@ static VkResult check_limits(RtrDevice d, const RtrModule* m, const RtrTraceOpti
     return VK_SUCCESS;
 }
 
-static VkResult pick_options(RtrDevice d, const RtrModule* m, const RtrTraceOptions* given, RtrTraceOptions* o) {
+static VkResult pick_options(RtrDevice d, const RtrModule* m, const RtrTraceOptions* given,
+                             RtrTraceOptions* o) {
     const RtrTraceOptions* best = &d->support.recommended;
     *o = *best;
     if (given) {
@@ -86,14 +92,16 @@ static VkResult pick_options(RtrDevice d, const RtrModule* m, const RtrTraceOpti
     }
     if ((o->fetch != RTR_FETCH_TEXEL && o->fetch != RTR_FETCH_STORAGE) || o->workgroupSize == 0 ||
         o->workgroupSize % 32 || o->sharedStack > RTC_TRAVERSAL_STACK)
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "trace-options",
-                         "RtrTraceOptions: fetch %d, workgroupSize %u (a multiple of 32), sharedStack %u (at most %u)",
-                         (int)o->fetch, o->workgroupSize, o->sharedStack, RTC_TRAVERSAL_STACK);
+        return rtr_error(
+            d, VK_ERROR_VALIDATION_FAILED_EXT, "trace-options",
+            "RtrTraceOptions: fetch %d, workgroupSize %u (a multiple of 32), sharedStack %u (at most %u)",
+            (int)o->fetch, o->workgroupSize, o->sharedStack, RTC_TRAVERSAL_STACK);
     if (!(m->header.flags & RTC_MODULE_RESUMABLE)) {
         if (d->support.needsResumableModules)
-            rtr_warning(d, "not-resumable",
-                        "this device ends long loops without a word and the module cannot suspend: pictures may be "
-                        "wrong; link it as resumable");
+            rtr_warning(
+                d, "not-resumable",
+                "this device ends long loops without a word and the module cannot suspend: pictures may be "
+                "wrong; link it as resumable");
         o->stepBudget = 0;
     }
     return VK_SUCCESS;
@@ -112,7 +120,8 @@ static VkResult create_layout(RtrDevice d, const RtrRayTracingPipelineCreateInfo
         sets[i] = i < info->setLayoutCount && info->pSetLayouts[i] ? info->pSetLayouts[i] : d->empty_layout;
     }
     if (!p->reserved_in_app_set) {
-        set.bindingCount = rtr_reserved_bindings(p->header.used_bindings, p->header.reserved_binding, reserved);
+        set.bindingCount =
+            rtr_reserved_bindings(p->header.used_bindings, p->header.reserved_binding, reserved);
         set.pBindings = reserved;
         r = d->vk.CreateDescriptorSetLayout(d->device, &set, a, &p->reserved_layout);
         if (r != VK_SUCCESS) return rtr_error(d, r, "reserved-set", "vkCreateDescriptorSetLayout failed");
@@ -128,16 +137,18 @@ static VkResult create_layout(RtrDevice d, const RtrRayTracingPipelineCreateInfo
 }
 
 /* The application's constants with ours behind them. */
-static VkResult create_pipeline(RtrDevice d, VkPipelineCache cache, const RtrRayTracingPipelineCreateInfo* info,
-                                RtrPipeline p, const VkAllocationCallbacks* a) {
+static VkResult create_pipeline(RtrDevice d, VkPipelineCache cache,
+                                const RtrRayTracingPipelineCreateInfo* info, RtrPipeline p,
+                                const VkAllocationCallbacks* a) {
     const VkSpecializationInfo* given = info->pSpecializationInfo;
     const uint32_t given_count = given ? given->mapEntryCount : 0;
     const size_t given_bytes = given ? given->dataSize : 0, ours_at = (given_bytes + 3) / 4 * 4;
-    const uint32_t ours[5][2] = {{RTC_SPEC_WORKGROUP_SIZE, p->options.workgroupSize},
-                                 {RTC_SPEC_FETCH, (uint32_t)p->options.fetch},
-                                 {RTC_SPEC_WHILE_WHILE, p->options.whileWhile},
-                                 {RTC_SPEC_STEP_BUDGET, p->options.stepBudget ? p->options.stepBudget : 0xffffffffu},
-                                 {RTC_SPEC_SHARED_STACK, p->options.sharedStack}};
+    const uint32_t ours[5][2] = {
+        {RTC_SPEC_WORKGROUP_SIZE, p->options.workgroupSize},
+        {RTC_SPEC_FETCH, (uint32_t)p->options.fetch},
+        {RTC_SPEC_WHILE_WHILE, p->options.whileWhile},
+        {RTC_SPEC_STEP_BUDGET, p->options.stepBudget ? p->options.stepBudget : 0xffffffffu},
+        {RTC_SPEC_SHARED_STACK, p->options.sharedStack}};
     VkSpecializationMapEntry* entries = rtr_alloc(a, (given_count + 5) * sizeof *entries);
     unsigned char* data = rtr_alloc(a, ours_at + 5 * 4);
     VkShaderModuleCreateInfo module = {.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO};
@@ -189,7 +200,8 @@ static VkResult create_pipeline(RtrDevice d, VkPipelineCache cache, const RtrRay
     return r;
 }
 
-VkResult rtrCreateRayTracingPipeline(RtrDevice d, VkPipelineCache cache, const RtrRayTracingPipelineCreateInfo* info,
+VkResult rtrCreateRayTracingPipeline(RtrDevice d, VkPipelineCache cache,
+                                     const RtrRayTracingPipelineCreateInfo* info,
                                      const VkAllocationCallbacks* allocator, RtrPipeline* pPipeline) {
     const VkAllocationCallbacks* a = rtr_pick(d, allocator);
     RtrModule module;
@@ -198,9 +210,11 @@ VkResult rtrCreateRayTracingPipeline(RtrDevice d, VkPipelineCache cache, const R
     VkResult r;
     *pPipeline = NULL;
     if (info->pNext)
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "pNext", "RtrRayTracingPipelineCreateInfo::pNext must be NULL");
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "pNext",
+                         "RtrRayTracingPipelineCreateInfo::pNext must be NULL");
     if (info->setLayoutCount > 32)
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "set-layouts", "%u set layouts", info->setLayoutCount);
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "set-layouts", "%u set layouts",
+                         info->setLayoutCount);
     if ((r = rtr_parse_module(d, info->pCode, info->codeSize, a, &module)) != VK_SUCCESS) return r;
     p = rtr_alloc(a, sizeof *p);
     if (!p) {
@@ -212,14 +226,17 @@ VkResult rtrCreateRayTracingPipeline(RtrDevice d, VkPipelineCache cache, const R
     p->groups = module.groups;
     p->json = module.json;
     /* A module that uses none of our bindings cannot come from rtc: the parameters are always used. */
-    p->reserved_in_app_set = p->header.reserved_set < info->setLayoutCount && info->pSetLayouts[p->header.reserved_set];
-    p->set_layout_count = info->setLayoutCount > p->header.reserved_set + 1 ? info->setLayoutCount : p->header.reserved_set + 1;
+    p->reserved_in_app_set =
+        p->header.reserved_set < info->setLayoutCount && info->pSetLayouts[p->header.reserved_set];
+    p->set_layout_count =
+        info->setLayoutCount > p->header.reserved_set + 1 ? info->setLayoutCount : p->header.reserved_set + 1;
     for (i = 0; i < info->pushConstantRangeCount; i++) {
         uint32_t end = info->pPushConstantRanges[i].offset + info->pPushConstantRanges[i].size;
         if (end > p->push_size) p->push_size = end;
     }
     if (p->push_size > RTR_MAX_PUSH_BYTES)
-        r = rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "push-constants", "%u bytes of push constants", p->push_size);
+        r = rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "push-constants", "%u bytes of push constants",
+                      p->push_size);
     if (r == VK_SUCCESS) r = pick_options(d, &module, info->pOptions, &p->options);
     if (r == VK_SUCCESS) r = check_limits(d, &module, &p->options, p->set_layout_count, p->push_size);
     if (r == VK_SUCCESS) r = create_layout(d, info, p, a);
@@ -243,8 +260,8 @@ void rtrDestroyPipeline(RtrDevice d, RtrPipeline p, const VkAllocationCallbacks*
     rtr_free(a, p);
 }
 
-VkResult rtrGetRayTracingShaderGroupHandles(RtrDevice d, RtrPipeline p, uint32_t firstGroup, uint32_t groupCount,
-                                            size_t dataSize, void* pData) {
+VkResult rtrGetRayTracingShaderGroupHandles(RtrDevice d, RtrPipeline p, uint32_t firstGroup,
+                                            uint32_t groupCount, size_t dataSize, void* pData) {
     uint32_t i;
     if (firstGroup > p->header.group_count || groupCount > p->header.group_count - firstGroup ||
         dataSize / RTC_HANDLE_BYTES < groupCount)
@@ -252,7 +269,8 @@ VkResult rtrGetRayTracingShaderGroupHandles(RtrDevice d, RtrPipeline p, uint32_t
                          "groups %u to %u of %u, %llu bytes: out of range, or too few bytes", firstGroup,
                          firstGroup + groupCount, p->header.group_count, (unsigned long long)dataSize);
     for (i = 0; i < groupCount; i++)
-        memcpy((char*)pData + (size_t)i * RTC_HANDLE_BYTES, p->groups[firstGroup + i].handle, RTC_HANDLE_BYTES);
+        memcpy((char*)pData + (size_t)i * RTC_HANDLE_BYTES, p->groups[firstGroup + i].handle,
+               RTC_HANDLE_BYTES);
     return VK_SUCCESS;
 }
 

@@ -4,16 +4,18 @@
 
 static const VkAllocationCallbacks* own(RtrRecorder r) { return r->has_allocator ? &r->allocator : NULL; }
 
-VkResult rtrCreateRecorder(RtrDevice d, const RtrRecorderCreateInfo* info, const VkAllocationCallbacks* allocator,
-                           RtrRecorder* pRecorder) {
+VkResult rtrCreateRecorder(RtrDevice d, const RtrRecorderCreateInfo* info,
+                           const VkAllocationCallbacks* allocator, RtrRecorder* pRecorder) {
     const VkAllocationCallbacks* a = rtr_pick(d, allocator);
     RtrRecorder r;
     *pRecorder = NULL;
     if (info->pNext)
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "pNext", "RtrRecorderCreateInfo::pNext must be NULL");
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "pNext",
+                         "RtrRecorderCreateInfo::pNext must be NULL");
     if (info->controlBuffer && info->controlOffset % 256)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "control-offset",
-                         "controlOffset %llu must be a multiple of 256", (unsigned long long)info->controlOffset);
+                         "controlOffset %llu must be a multiple of 256",
+                         (unsigned long long)info->controlOffset);
     r = rtr_alloc(a, sizeof *r);
     if (!r) return VK_ERROR_OUT_OF_HOST_MEMORY;
     r->device = d;
@@ -45,7 +47,8 @@ void rtrDestroyRecorder(RtrDevice d, RtrRecorder r, const VkAllocationCallbacks*
 
 VkResult rtrBeginRecorder(RtrRecorder r, VkCommandBuffer cmd) {
     if (!cmd)
-        return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "command-buffer", "rtrBeginRecorder: no command buffer");
+        return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "command-buffer",
+                         "rtrBeginRecorder: no command buffer");
     r->cmd = cmd;
     r->pipeline = NULL;
     r->set_call_count = 0;
@@ -55,7 +58,8 @@ VkResult rtrBeginRecorder(RtrRecorder r, VkCommandBuffer cmd) {
 
 VkResult rtrRetireRecorder(RtrRecorder r) {
     RtrPool* pool;
-    for (pool = r->pools; pool; pool = pool->next) r->device->vk.ResetDescriptorPool(r->device->device, pool->pool, 0);
+    for (pool = r->pools; pool; pool = pool->next)
+        r->device->vk.ResetDescriptorPool(r->device->device, pool->pool, 0);
     r->current_pool = r->pools;
     r->control_used = 0;
     r->launch_count = 0;
@@ -124,7 +128,8 @@ void rtr_barrier(RtrRecorder r, VkPipelineStageFlags src, VkAccessFlags src_acce
 }
 
 void rtr_compute_barrier(RtrRecorder r) {
-    rtr_barrier(r, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_SHADER_READ_BIT,
+    rtr_barrier(r, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
+                VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_SHADER_READ_BIT,
                 VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_DRAW_INDIRECT_BIT,
                 VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_UNIFORM_READ_BIT |
                     VK_ACCESS_INDIRECT_COMMAND_READ_BIT);

@@ -54,7 +54,8 @@ VkResult rtrGetPhysicalDeviceSupport(VkInstance instance, VkPhysicalDevice physi
     RtrInstanceTable vk;
     const char* missing = NULL;
     VkPhysicalDeviceProperties2 properties = {.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2};
-    VkPhysicalDeviceSubgroupProperties subgroup = {.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_PROPERTIES};
+    VkPhysicalDeviceSubgroupProperties subgroup = {.sType =
+                                                       VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_PROPERTIES};
     VkPhysicalDeviceDriverProperties driver = {.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_DRIVER_PROPERTIES};
     VkPhysicalDeviceFeatures2 features = {.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2};
     VkPhysicalDeviceBufferDeviceAddressFeatures address = {
@@ -91,7 +92,8 @@ VkResult rtrGetPhysicalDeviceSupport(VkInstance instance, VkPhysicalDevice physi
     require(pSupport, "maxComputeWorkGroupInvocations", RTR_GROUP, l->maxComputeWorkGroupInvocations);
     require(pSupport, "maxComputeWorkGroupSize[0]", RTR_GROUP, l->maxComputeWorkGroupSize[0]);
     require(pSupport, "maxComputeSharedMemorySize", 16384, l->maxComputeSharedMemorySize);
-    require(pSupport, "maxPerStageDescriptorStorageBuffers", RTR_ARR_COUNT + 3, l->maxPerStageDescriptorStorageBuffers);
+    require(pSupport, "maxPerStageDescriptorStorageBuffers", RTR_ARR_COUNT + 3,
+            l->maxPerStageDescriptorStorageBuffers);
     require(pSupport, "maxDescriptorSetStorageBuffers", RTR_ARR_COUNT + 3, l->maxDescriptorSetStorageBuffers);
     require(pSupport, "maxPerStageResources", RTR_ARR_COUNT + 4, l->maxPerStageResources);
     require(pSupport, "maxPushConstantsSize", sizeof(struct RtrBuildPush), l->maxPushConstantsSize);

@@ -1,83 +1,8 @@
-/* Ray tracing state of a recorder and its launches: parameters, control blocks, tiles
- * and rounds. */
+/* Launches: parameters, control blocks, tiles and rounds. */
 #include "internal.h"
 
 #define PARAM_BYTES (RTC_PARAM_QUADS * RTC_QUAD_BYTES)
 #define UPDATE_BYTES 16384u /* per vkCmdUpdateBuffer; Vulkan allows 65536 */
-
-static VkResult not_begun(RtrRecorder r, const char* name) {
-    return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "recorder-not-begun", "%s: rtrBeginRecorder first", name);
-}
-
-VkResult rtrCmdBindPipeline(RtrRecorder r, RtrPipeline pipeline) {
-    if (!r->cmd) return not_begun(r, "rtrCmdBindPipeline");
-    r->pipeline = pipeline;
-    return VK_SUCCESS;
-}
-
-VkResult rtrCmdBindDescriptorSets(RtrRecorder r, uint32_t firstSet, uint32_t count, const VkDescriptorSet* sets,
-                                  uint32_t dynamicCount, const uint32_t* dynamics) {
-    RtrBoundSets* call;
-    uint32_t i, kept = 0;
-    if (!r->cmd) return not_begun(r, "rtrCmdBindDescriptorSets");
-    if (count > RTR_MAX_SETS_PER_CALL || dynamicCount >= RTR_MAX_DYNAMICS_PER_CALL)
-        return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "bind-sets", "%u sets, %u dynamic offsets; at most %u, %u",
-                         count, dynamicCount, RTR_MAX_SETS_PER_CALL, RTR_MAX_DYNAMICS_PER_CALL - 1);
-    if (!count) return VK_SUCCESS;
-    /* Calls that this one covers whole have no effect any more. */
-    for (i = 0; i < r->set_call_count; i++) {
-        const RtrBoundSets* c = &r->set_calls[i];
-        if (c->first >= firstSet && c->first + c->count <= firstSet + count) continue;
-        if (kept != i) r->set_calls[kept] = *c;
-        kept++;
-    }
-    r->set_call_count = kept;
-    if (r->set_call_count == RTR_MAX_SET_CALLS)
-        return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "bind-sets", "too many overlapping binds");
-    call = &r->set_calls[r->set_call_count++];
-    call->first = firstSet;
-    call->count = count;
-    call->dynamic_count = dynamicCount;
-    memcpy(call->sets, sets, count * sizeof *sets);
-    if (dynamicCount) memcpy(call->dynamics, dynamics, dynamicCount * sizeof *dynamics);
-    return VK_SUCCESS;
-}
-
-VkResult rtrCmdPushConstants(RtrRecorder r, uint32_t offset, uint32_t size, const void* values) {
-    if (!r->cmd) return not_begun(r, "rtrCmdPushConstants");
-    if (offset % 4 || size % 4 || size > RTR_MAX_PUSH_BYTES || offset > RTR_MAX_PUSH_BYTES - size)
-        return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "push-constants",
-                         "offset %u and size %u must be multiples of 4 below %u", offset, size, RTR_MAX_PUSH_BYTES);
-    if (offset + size > r->push_size) {
-        memset((char*)r->push_words + r->push_size, 0, offset + size - r->push_size);
-        r->push_size = offset + size;
-    }
-    memcpy((char*)r->push_words + offset, values, size);
-    return VK_SUCCESS;
-}
-
-VkResult rtrCmdSetHeap(RtrRecorder r, RtrHeap heap) {
-    r->heap = heap;
-    return VK_SUCCESS;
-}
-
-VkResult rtrCmdSetLaunchScratch(RtrRecorder r, VkBuffer buffer, VkDeviceSize offset, VkDeviceSize size) {
-    if (buffer && offset % 256)
-        return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "scratch", "launch scratch offset %llu: not a multiple of 256",
-                         (unsigned long long)offset);
-    r->scratch = buffer;
-    r->scratch_offset = offset;
-    r->scratch_size = buffer ? size : 0;
-    return VK_SUCCESS;
-}
-
-VkResult rtrCmdSetLaunchLimits(RtrRecorder r, uint64_t maxTileLanes, uint32_t maxRounds) {
-    if (maxRounds > 16384)
-        return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "rounds", "maxRounds %u: at most 16384", maxRounds);
-    r->max_tile_lanes = maxTileLanes;
-    r->max_rounds = maxRounds ? maxRounds : RTR_DEFAULT_ROUNDS;
-    return VK_SUCCESS;
-}
 
 /* ---- Lanes, tiles, rounds -------------------------------------------------------------- */
 
@@ -113,7 +38,8 @@ static VkResult shape_launch(RtrRecorder r, uint32_t w, uint32_t h, uint32_t d, 
         const uint64_t room = rtr_min_size(r->scratch_size, r->device->limits.maxStorageBufferRange) / each;
         if (room < group)
             return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "launch-scratch",
-                             "the module needs at least %llu bytes of launch scratch (rtrGetLaunchScratchSize), %llu are set",
+                             "the module needs at least %llu bytes of launch scratch "
+                             "(rtrGetLaunchScratchSize), %llu are set",
                              (unsigned long long)(each * group), (unsigned long long)r->scratch_size);
         if (room < most) most = room;
     }
@@ -173,11 +99,13 @@ typedef struct Launch {
 static VkResult check_region(RtrRecorder r, const char* name, const RtrStridedBufferRegion* g, bool raygen) {
     if (!g->buffer) {
         if (!raygen) return VK_SUCCESS;
-        return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "sbt-raygen", "the raygen region has no buffer");
+        return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "sbt-raygen",
+                         "the raygen region has no buffer");
     }
     if (g->offset % RTC_SBT_BASE_ALIGNMENT)
-        return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "sbt-offset", "%s region: offset %llu is not a multiple of %u",
-                         name, (unsigned long long)g->offset, RTC_SBT_BASE_ALIGNMENT);
+        return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "sbt-offset",
+                         "%s region: offset %llu is not a multiple of %u", name,
+                         (unsigned long long)g->offset, RTC_SBT_BASE_ALIGNMENT);
     if (!raygen && (g->stride % RTC_SBT_HANDLE_ALIGNMENT || g->stride > RTC_SBT_MAX_STRIDE))
         return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "sbt-stride",
                          "%s region: stride %llu must be a multiple of %u and at most %u", name,
@@ -211,7 +139,8 @@ static void put64(uint32_t* w, uint32_t at, VkDeviceSize v) {
 }
 
 static void fill_params(const Launch* l, uint32_t tile, uint32_t round, uint32_t* w) {
-    const uint32_t at[4] = {RTC_PARAM_RAYGEN_OFFSET, RTC_PARAM_MISS_OFFSET, RTC_PARAM_HIT_OFFSET, RTC_PARAM_CALLABLE_OFFSET};
+    const uint32_t at[4] = {RTC_PARAM_RAYGEN_OFFSET, RTC_PARAM_MISS_OFFSET, RTC_PARAM_HIT_OFFSET,
+                            RTC_PARAM_CALLABLE_OFFSET};
     const uint64_t base = (uint64_t)tile * l->shape.tile_lanes;
     uint32_t i;
     memset(w, 0, PARAM_BYTES);
@@ -238,7 +167,8 @@ static void fill_params(const Launch* l, uint32_t tile, uint32_t round, uint32_t
 
 static void tile_groups(const Launch* l, uint32_t tile, uint32_t groups[4]) {
     const uint64_t base = (uint64_t)tile * l->shape.tile_lanes;
-    const uint32_t n = rtr_groups(rtr_min_size(l->shape.tile_lanes, l->shape.lanes - base), l->p->options.workgroupSize);
+    const uint32_t n =
+        rtr_groups(rtr_min_size(l->shape.tile_lanes, l->shape.lanes - base), l->p->options.workgroupSize);
     groups[0] = n < RTC_MAX_GROUPS_X ? n : RTC_MAX_GROUPS_X;
     groups[1] = rtr_groups(n, RTC_MAX_GROUPS_X);
     groups[2] = 1;
@@ -259,7 +189,8 @@ static void upload_params(const Launch* l) {
             fill_params(l, (uint32_t)((at + i) / l->shape.rounds), (uint32_t)((at + i) % l->shape.rounds),
                         words + i * (stride / 4));
         }
-        r->device->vk.CmdUpdateBuffer(r->cmd, r->control, l->params + at * stride, (VkDeviceSize)n * stride, words);
+        r->device->vk.CmdUpdateBuffer(r->cmd, r->control, l->params + at * stride, (VkDeviceSize)n * stride,
+                                      words);
     }
 }
 
@@ -269,11 +200,13 @@ static void reset_control(const Launch* l, uint32_t tile, bool whole) {
     const VkDeviceSize skip = whole ? 0 : 4 * RTC_CTRL_ARGS;
     uint32_t groups[4];
     tile_groups(l, tile, groups);
-    r->device->vk.CmdFillBuffer(r->cmd, r->control, l->control + skip, control_bytes(l->shape.rounds) - skip, 0);
+    r->device->vk.CmdFillBuffer(r->cmd, r->control, l->control + skip, control_bytes(l->shape.rounds) - skip,
+                                0);
     if (l->shape.rounds > 1) {
-        rtr_barrier(r, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_TRANSFER_BIT,
-                    VK_ACCESS_TRANSFER_WRITE_BIT);
-        r->device->vk.CmdUpdateBuffer(r->cmd, r->control, l->control + 4 * RTC_CTRL_ARGS, sizeof groups, groups);
+        rtr_barrier(r, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT,
+                    VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT);
+        r->device->vk.CmdUpdateBuffer(r->cmd, r->control, l->control + 4 * RTC_CTRL_ARGS, sizeof groups,
+                                      groups);
     }
 }
 
@@ -285,8 +218,8 @@ static void after_transfer(RtrRecorder r) {
 }
 
 static void before_transfer(RtrRecorder r) {
-    rtr_barrier(r, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_DRAW_INDIRECT_BIT, VK_ACCESS_SHADER_WRITE_BIT,
-                VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT);
+    rtr_barrier(r, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_DRAW_INDIRECT_BIT,
+                VK_ACCESS_SHADER_WRITE_BIT, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT);
 }
 
 typedef struct ReservedInfo {
@@ -297,7 +230,8 @@ typedef struct ReservedInfo {
 static void write_reserved(RtrDevice d, const RtrPipeline p, VkDescriptorSet set, const ReservedInfo* info) {
     VkWriteDescriptorSet writes[RTC_BINDING_COUNT];
     VkDescriptorSetLayoutBinding bindings[RTC_BINDING_COUNT];
-    const uint32_t count = rtr_reserved_bindings(p->header.used_bindings, p->header.reserved_binding, bindings);
+    const uint32_t count =
+        rtr_reserved_bindings(p->header.used_bindings, p->header.reserved_binding, bindings);
     uint32_t i;
     memset(writes, 0, sizeof writes);
     for (i = 0; i < count; i++) {
@@ -346,7 +280,8 @@ static VkResult own_set(Launch* l) {
     return VK_SUCCESS;
 }
 
-VkResult rtrWriteReservedDescriptors(RtrDevice d, RtrPipeline p, VkDescriptorSet set, const RtrReservedDescriptors* in) {
+VkResult rtrWriteReservedDescriptors(RtrDevice d, RtrPipeline p, VkDescriptorSet set,
+                                     const RtrReservedDescriptors* in) {
     const VkBuffer sbt[4] = {in->raygenBuffer, in->missBuffer, in->hitBuffer, in->callableBuffer};
     ReservedInfo info;
     uint32_t i;
@@ -354,7 +289,8 @@ VkResult rtrWriteReservedDescriptors(RtrDevice d, RtrPipeline p, VkDescriptorSet
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "reserved-set",
                          "the pipeline keeps its reserved bindings in a set of the runtime");
     if (!in->recorder || !in->recorder->control)
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "control-buffer", "RtrReservedDescriptors: a recorder with a control region is needed");
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "control-buffer",
+                         "RtrReservedDescriptors: a recorder with a control region is needed");
     info.texels = VK_NULL_HANDLE;
     for (i = 0; i < RTC_BINDING_COUNT; i++) {
         info.buffers[i].buffer = in->recorder->control;
@@ -372,7 +308,8 @@ VkResult rtrWriteReservedDescriptors(RtrDevice d, RtrPipeline p, VkDescriptorSet
     if (in->launchScratch) {
         info.buffers[RTC_BINDING_SCRATCH].buffer = in->launchScratch;
         info.buffers[RTC_BINDING_SCRATCH].offset = in->launchScratchOffset;
-        info.buffers[RTC_BINDING_SCRATCH].range = rtr_min_size(in->launchScratchSize, d->limits.maxStorageBufferRange);
+        info.buffers[RTC_BINDING_SCRATCH].range =
+            rtr_min_size(in->launchScratchSize, d->limits.maxStorageBufferRange);
     }
     write_reserved(d, p, set, &info);
     return VK_SUCCESS;
@@ -396,16 +333,17 @@ static VkResult bind_state(const Launch* l, uint32_t params_dynamic) {
                                  "set %u is the module's reserved set; the runtime binds it", reserved);
             if (reserved + 1 != c->first + c->count)
                 return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "reserved-set",
-                                 "set %u holds the reserved bindings and must be the last of its bind call", reserved);
+                                 "set %u holds the reserved bindings and must be the last of its bind call",
+                                 reserved);
             found = true;
             c->dynamics[dynamics++] = params_dynamic;
         }
-        vk->CmdBindDescriptorSets(r->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, l->p->layout, c->first, c->count, c->sets,
-                                  dynamics, c->dynamics);
+        vk->CmdBindDescriptorSets(r->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, l->p->layout, c->first, c->count,
+                                  c->sets, dynamics, c->dynamics);
     }
     if (!found)
-        return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "reserved-set", "set %u with the reserved bindings is not bound",
-                         reserved);
+        return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "reserved-set",
+                         "set %u with the reserved bindings is not bound", reserved);
     if (l->p->push_size && r->push_size)
         vk->CmdPushConstants(r->cmd, l->p->layout, VK_SHADER_STAGE_COMPUTE_BIT, 0,
                              r->push_size < l->p->push_size ? r->push_size : l->p->push_size, r->push_words);
@@ -416,11 +354,10 @@ static VkResult bind_state(const Launch* l, uint32_t params_dynamic) {
 static VkResult bind_params(const Launch* l, uint32_t tile, uint32_t round) {
     RtrRecorder r = l->r;
     const uint64_t slot = (uint64_t)tile * l->shape.rounds + round;
-    const uint32_t dynamic =
-        (uint32_t)(l->params - r->control_offset + slot * param_stride(r->device));
+    const uint32_t dynamic = (uint32_t)(l->params - r->control_offset + slot * param_stride(r->device));
     if (l->p->reserved_in_app_set) return bind_state(l, dynamic);
-    r->device->vk.CmdBindDescriptorSets(r->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, l->p->layout, l->p->header.reserved_set,
-                                        1, &l->reserved, 1, &dynamic);
+    r->device->vk.CmdBindDescriptorSets(r->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, l->p->layout,
+                                        l->p->header.reserved_set, 1, &l->reserved, 1, &dynamic);
     return VK_SUCCESS;
 }
 
@@ -444,7 +381,8 @@ static VkResult finish_tile(const Launch* l) {
     push.step = RTC_CTRL_ARGS + 4 * l->shape.rounds;
     push.count = l->p->options.workgroupSize;
     d->vk.CmdBindPipeline(r->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, d->kernels[RTR_KERNEL_finish_launch]);
-    d->vk.CmdBindDescriptorSets(r->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, d->kernel_layout, 1, 1, &write.dstSet, 0, NULL);
+    d->vk.CmdBindDescriptorSets(r->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, d->kernel_layout, 1, 1, &write.dstSet,
+                                0, NULL);
     d->vk.CmdPushConstants(r->cmd, d->kernel_layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof push, &push);
     d->vk.CmdDispatch(r->cmd, 1, 1, 1);
     return VK_SUCCESS;
@@ -488,7 +426,8 @@ static VkResult prepare_indirect(const Launch* l) {
     push.blocks = l->p->options.workgroupSize;
     push.window_count = (uint32_t)l->shape.lanes;
     d->vk.CmdBindPipeline(r->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, d->kernels[RTR_KERNEL_prepare_launch]);
-    d->vk.CmdBindDescriptorSets(r->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, d->kernel_layout, 0, 2, sets, 0, NULL);
+    d->vk.CmdBindDescriptorSets(r->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, d->kernel_layout, 0, 2, sets, 0,
+                                NULL);
     d->vk.CmdPushConstants(r->cmd, d->kernel_layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof push, &push);
     d->vk.CmdDispatch(r->cmd, rtr_groups(slots, RTR_GROUP), 1, 1);
     rtr_compute_barrier(r);
@@ -510,7 +449,8 @@ static VkResult record_tiles(Launch* l) {
             rtr_compute_barrier(r); /* tiles share scratch and the control block */
         }
         if (tile == 0 || l->shape.rounds > 1)
-            if ((result = bind_state(l, (uint32_t)(l->params - r->control_offset))) != VK_SUCCESS) return result;
+            if ((result = bind_state(l, (uint32_t)(l->params - r->control_offset))) != VK_SUCCESS)
+                return result;
         for (round = 0; round < l->shape.rounds; round++) {
             if (round) rtr_compute_barrier(r);
             if ((result = bind_params(l, tile, round)) != VK_SUCCESS) return result;
@@ -547,26 +487,29 @@ static VkResult take_control(Launch* l) {
     }
     if (params + block > r->control_size - r->control_used)
         return rtr_error(r->device, VK_ERROR_OUT_OF_POOL_MEMORY, "control-region",
-                         "the recorder's control region of %llu bytes is full: this launch (%u tiles, %u rounds) needs %llu, "
+                         "the recorder's control region of %llu bytes is full: this launch (%u tiles, %u "
+                         "rounds) needs %llu, "
                          "%llu are left (rtrGetRecorderControlSize, rtrRetireRecorder)",
                          (unsigned long long)r->control_size, l->shape.tiles, l->shape.rounds,
-                         (unsigned long long)(params + block), (unsigned long long)(r->control_size - r->control_used));
+                         (unsigned long long)(params + block),
+                         (unsigned long long)(r->control_size - r->control_used));
     l->params = r->control_offset + r->control_used;
     l->control = l->params + params;
     return VK_SUCCESS;
 }
 
 static VkResult trace(RtrRecorder r, const RtrStridedBufferRegion* raygen, const RtrStridedBufferRegion* miss,
-                      const RtrStridedBufferRegion* hit, const RtrStridedBufferRegion* callable, VkBuffer indirect,
-                      VkDeviceSize indirect_offset, uint32_t w, uint32_t h, uint32_t d) {
+                      const RtrStridedBufferRegion* hit, const RtrStridedBufferRegion* callable,
+                      VkBuffer indirect, VkDeviceSize indirect_offset, uint32_t w, uint32_t h, uint32_t d) {
     static const char* const names[4] = {"raygen", "miss", "hit", "callable"};
     const RtrStridedBufferRegion* given[4];
     Launch l;
     uint32_t i;
     VkResult result;
-    if (!r->cmd) return not_begun(r, "rtrCmdTraceRays");
+    if (!r->cmd) return rtr_not_begun(r, "rtrCmdTraceRays");
     if (!r->pipeline)
-        return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "no-pipeline", "rtrCmdTraceRays: no pipeline is bound");
+        return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "no-pipeline",
+                         "rtrCmdTraceRays: no pipeline is bound");
     memset(&l, 0, sizeof l);
     l.r = r;
     l.p = r->pipeline;
@@ -583,11 +526,14 @@ static VkResult trace(RtrRecorder r, const RtrStridedBufferRegion* raygen, const
         return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "control-buffer",
                          "the recorder was created without a control region; launches need one");
     if ((l.p->header.used_bindings >> RTC_BINDING_HEAP_TEXELS & 3) && !r->heap)
-        return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "no-heap", "rtrCmdTraceRays: rtrCmdSetHeap first");
-    if (r->heap && l.p->options.fetch == RTR_FETCH_STORAGE && r->heap->size > r->device->limits.maxStorageBufferRange)
-        return rtr_error(r->device, VK_ERROR_FEATURE_NOT_PRESENT, "maxStorageBufferRange",
-                         "heap of %llu bytes with RTR_FETCH_STORAGE: maxStorageBufferRange is %u; use RTR_FETCH_TEXEL",
-                         (unsigned long long)r->heap->size, r->device->limits.maxStorageBufferRange);
+        return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "no-heap",
+                         "rtrCmdTraceRays: rtrCmdSetHeap first");
+    if (r->heap && l.p->options.fetch == RTR_FETCH_STORAGE &&
+        r->heap->size > r->device->limits.maxStorageBufferRange)
+        return rtr_error(
+            r->device, VK_ERROR_FEATURE_NOT_PRESENT, "maxStorageBufferRange",
+            "heap of %llu bytes with RTR_FETCH_STORAGE: maxStorageBufferRange is %u; use RTR_FETCH_TEXEL",
+            (unsigned long long)r->heap->size, r->device->limits.maxStorageBufferRange);
     l.indirect = indirect;
     l.indirect_offset = indirect_offset;
     l.size[0] = w;
@@ -611,26 +557,28 @@ static VkResult trace(RtrRecorder r, const RtrStridedBufferRegion* raygen, const
     return VK_SUCCESS;
 }
 
-VkResult rtrCmdTraceRaysRegions(RtrRecorder r, const RtrStridedBufferRegion* raygen, const RtrStridedBufferRegion* miss,
-                                const RtrStridedBufferRegion* hit, const RtrStridedBufferRegion* callable, uint32_t w,
-                                uint32_t h, uint32_t d) {
+VkResult rtrCmdTraceRaysRegions(RtrRecorder r, const RtrStridedBufferRegion* raygen,
+                                const RtrStridedBufferRegion* miss, const RtrStridedBufferRegion* hit,
+                                const RtrStridedBufferRegion* callable, uint32_t w, uint32_t h, uint32_t d) {
     return trace(r, raygen, miss, hit, callable, VK_NULL_HANDLE, 0, w, h, d);
 }
 
 VkResult rtrCmdTraceRaysIndirect(RtrRecorder r, const RtrStridedBufferRegion* raygen,
                                  const RtrStridedBufferRegion* miss, const RtrStridedBufferRegion* hit,
-                                 const RtrStridedBufferRegion* callable, VkBuffer indirect, VkDeviceSize offset,
-                                 uint32_t max_w, uint32_t max_h, uint32_t max_d) {
+                                 const RtrStridedBufferRegion* callable, VkBuffer indirect,
+                                 VkDeviceSize offset, uint32_t max_w, uint32_t max_h, uint32_t max_d) {
     if (!indirect || offset % 4)
         return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "indirect-buffer",
-                         "indirectBuffer missing, or indirectOffset %llu not a multiple of 4", (unsigned long long)offset);
+                         "indirectBuffer missing, or indirectOffset %llu not a multiple of 4",
+                         (unsigned long long)offset);
     return trace(r, raygen, miss, hit, callable, indirect, offset, max_w, max_h, max_d);
 }
 
 VkResult rtrCmdTraceRays(RtrRecorder r, VkBuffer raygenBuffer, VkDeviceSize raygenOffset, VkBuffer missBuffer,
-                         VkDeviceSize missOffset, VkDeviceSize missStride, VkBuffer hitBuffer, VkDeviceSize hitOffset,
-                         VkDeviceSize hitStride, VkBuffer callableBuffer, VkDeviceSize callableOffset,
-                         VkDeviceSize callableStride, uint32_t width, uint32_t height, uint32_t depth) {
+                         VkDeviceSize missOffset, VkDeviceSize missStride, VkBuffer hitBuffer,
+                         VkDeviceSize hitOffset, VkDeviceSize hitStride, VkBuffer callableBuffer,
+                         VkDeviceSize callableOffset, VkDeviceSize callableStride, uint32_t width,
+                         uint32_t height, uint32_t depth) {
     const RtrStridedBufferRegion raygen = {raygenBuffer, raygenOffset, 0, VK_WHOLE_SIZE};
     const RtrStridedBufferRegion miss = {missBuffer, missOffset, missStride, VK_WHOLE_SIZE};
     const RtrStridedBufferRegion hit = {hitBuffer, hitOffset, hitStride, VK_WHOLE_SIZE};

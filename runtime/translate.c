@@ -46,7 +46,8 @@ VkShaderStageFlags rtrTranslateShaderStages(VkShaderStageFlags stages) {
 }
 
 VkDescriptorType rtrTranslateDescriptorType(VkDescriptorType type) {
-    if (type == VK_DESCRIPTOR_TYPE_ACCELERATION_STRUCTURE_NV || type == VK_DESCRIPTOR_TYPE_ACCELERATION_STRUCTURE_KHR)
+    if (type == VK_DESCRIPTOR_TYPE_ACCELERATION_STRUCTURE_NV ||
+        type == VK_DESCRIPTOR_TYPE_ACCELERATION_STRUCTURE_KHR)
         return VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
     return type;
 }

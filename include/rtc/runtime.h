@@ -74,8 +74,8 @@ RTR_API uint32_t rtrGetAbiVersion(void);
 /* ---- What a device offers ----------------------------------------------------- */
 
 typedef enum RtrFetch {
-    RTR_FETCH_TEXEL = 0,   /* nodes through a uniform texel buffer; best on lavapipe */
-    RTR_FETCH_STORAGE = 1, /* nodes through a storage buffer */
+    RTR_FETCH_TEXEL = 0,           /* nodes through a uniform texel buffer; best on lavapipe */
+    RTR_FETCH_STORAGE = 1,         /* nodes through a storage buffer */
     RTR_FETCH_DEFAULT = 0x7fffffff /* what the device recommends */
 } RtrFetch;
 
@@ -90,11 +90,12 @@ typedef struct RtrTraceOptions {
     uint32_t workgroupSize; /* lanes of a workgroup, a multiple of 32 */
     uint32_t stepBudget;    /* loop turns before a lane suspends; 0: never. Only used by resumable modules */
 } RtrTraceOptions;
-#define RTR_TRACE_OPTIONS_DEFAULT { RTR_FETCH_DEFAULT, RTR_DEFAULT, RTR_DEFAULT, RTR_DEFAULT, RTR_DEFAULT }
+#define RTR_TRACE_OPTIONS_DEFAULT \
+    { RTR_FETCH_DEFAULT, RTR_DEFAULT, RTR_DEFAULT, RTR_DEFAULT, RTR_DEFAULT }
 
 /* One thing the runtime needs of a device. */
 typedef struct RtrRequirement {
-    char name[72];      /* the Vulkan name: "maxPerStageDescriptorStorageBuffers", "apiVersion", ... */
+    char name[72]; /* the Vulkan name: "maxPerStageDescriptorStorageBuffers", "apiVersion", ... */
     uint64_t required;
     uint64_t available;
     VkBool32 met;
@@ -106,10 +107,10 @@ typedef struct RtrPhysicalDeviceSupport {
     VkBool32 supported; /* every requirement is met */
     uint32_t requirementCount;
     RtrRequirement requirements[RTR_MAX_REQUIREMENTS];
-    RtrTraceOptions recommended;    /* no field is a default */
-    VkBool32 needsResumableModules; /* the device ends or kills long loops: use modules compiled resumable */
-    VkBool32 heapMode;              /* always true when supported */
-    VkBool32 addressMode;           /* bufferDeviceAddress is there (the runtime does not use it yet) */
+    RtrTraceOptions recommended;     /* no field is a default */
+    VkBool32 needsResumableModules;  /* the device ends or kills long loops: use modules compiled resumable */
+    VkBool32 heapMode;               /* always true when supported */
+    VkBool32 addressMode;            /* bufferDeviceAddress is there (the runtime does not use it yet) */
     VkDeviceSize maxHeapSizeTexel;   /* bytes of heap that RTR_FETCH_TEXEL can reach */
     VkDeviceSize maxHeapSizeStorage; /* bytes of heap that RTR_FETCH_STORAGE can reach */
     uint32_t subgroupSize;
@@ -147,8 +148,8 @@ typedef struct RtrDeviceCreateInfo {
  * used for this object and everything made from it when their own is NULL, and
  * passed on to Vulkan.
  * Errors: VK_ERROR_FEATURE_NOT_PRESENT with the missing limits by name. */
-RTR_API VkResult rtrCreateDevice(const RtrDeviceCreateInfo* pCreateInfo, const VkAllocationCallbacks* pAllocator,
-                                 RtrDevice* pDevice);
+RTR_API VkResult rtrCreateDevice(const RtrDeviceCreateInfo* pCreateInfo,
+                                 const VkAllocationCallbacks* pAllocator, RtrDevice* pDevice);
 /* Objects made from the device must be gone. NULL is ignored. */
 RTR_API void rtrDestroyDevice(RtrDevice device, const VkAllocationCallbacks* pAllocator);
 
@@ -158,7 +159,8 @@ RTR_API const RtrPhysicalDeviceSupport* rtrGetDeviceSupport(RtrDevice device);
 /* Fills sType-tagged VkPhysicalDeviceRayTracingPropertiesNV (pNext is left alone):
  * handle size 32, max recursion 31, base alignment 64, max stride 4096, ...
  * Counterpart: vkGetPhysicalDeviceProperties2. */
-RTR_API void rtrGetRayTracingProperties(RtrDevice device, VkPhysicalDeviceRayTracingPropertiesNV* pProperties);
+RTR_API void rtrGetRayTracingProperties(RtrDevice device,
+                                        VkPhysicalDeviceRayTracingPropertiesNV* pProperties);
 
 /* ---- Enums of the extension, turned into valid Vulkan 1.1 ones --------------------
  * Without VK_NV_ray_tracing its enums must not reach vkCreateBuffer and friends. Each
@@ -177,7 +179,7 @@ RTR_API VkDescriptorType rtrTranslateDescriptorType(VkDescriptorType type);
 /* ---- Heap ------------------------------------------------------------------------- */
 
 /* Buffer usages a heap needs. Device-local memory is best. */
-#define RTR_HEAP_BUFFER_USAGE                                                       \
+#define RTR_HEAP_BUFFER_USAGE                                                        \
     (VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | \
      VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT)
 /* Buffer usages of build and update scratch. */
@@ -188,13 +190,14 @@ RTR_API VkDescriptorType rtrTranslateDescriptorType(VkDescriptorType type);
 /* Buffer usages of a recorder's control region. */
 #define RTR_CONTROL_BUFFER_USAGE                                               \
     (VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT | VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | \
-     VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT)
+     VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |  \
+     VK_BUFFER_USAGE_TRANSFER_SRC_BIT)
 /* Launch scratch (rtrCmdSetLaunchScratch). */
 #define RTR_LAUNCH_SCRATCH_BUFFER_USAGE VK_BUFFER_USAGE_STORAGE_BUFFER_BIT
 
 typedef struct RtrHeapCreateInfo {
-    const void* pNext; /* must be NULL */
-    VkBuffer buffer;   /* bound to memory, created with RTR_HEAP_BUFFER_USAGE */
+    const void* pNext;   /* must be NULL */
+    VkBuffer buffer;     /* bound to memory, created with RTR_HEAP_BUFFER_USAGE */
     VkDeviceSize offset; /* a multiple of 256 */
     VkDeviceSize size;   /* at least 512; at most RtrPhysicalDeviceSupport::maxHeapSizeTexel */
 } RtrHeapCreateInfo;
@@ -229,7 +232,8 @@ RTR_API void rtrFreeHeapRange(RtrHeap heap, VkDeviceSize offset);
  * alpha that is ignored; a missing z is 0); index types NONE_NV, UINT16, UINT32. One
  * kind of geometry per bottom level.
  * Errors: VALIDATION_FAILED for counts, formats, mixed geometry types, unknown pNext. */
-RTR_API VkResult rtrCreateAccelerationStructure(RtrDevice device, const VkAccelerationStructureCreateInfoNV* pCreateInfo,
+RTR_API VkResult rtrCreateAccelerationStructure(RtrDevice device,
+                                                const VkAccelerationStructureCreateInfoNV* pCreateInfo,
                                                 const VkAllocationCallbacks* pAllocator,
                                                 RtrAccelerationStructure* pAccelerationStructure);
 RTR_API void rtrDestroyAccelerationStructure(RtrDevice device, RtrAccelerationStructure accelerationStructure,
@@ -238,10 +242,9 @@ RTR_API void rtrDestroyAccelerationStructure(RtrDevice device, RtrAccelerationSt
 /* Size and alignment (256) of the object, its build scratch or its update scratch.
  * memoryTypeBits is all ones: the memory is a buffer of yours.
  * Counterpart: vkGetAccelerationStructureMemoryRequirementsNV. */
-RTR_API void rtrGetAccelerationStructureMemoryRequirements(RtrDevice device,
-                                                           VkAccelerationStructureMemoryRequirementsTypeNV type,
-                                                           RtrAccelerationStructure accelerationStructure,
-                                                           VkMemoryRequirements2* pMemoryRequirements);
+RTR_API void rtrGetAccelerationStructureMemoryRequirements(
+    RtrDevice device, VkAccelerationStructureMemoryRequirementsTypeNV type,
+    RtrAccelerationStructure accelerationStructure, VkMemoryRequirements2* pMemoryRequirements);
 
 typedef struct RtrBindAccelerationStructureMemoryInfo {
     const void* pNext; /* must be NULL */
@@ -257,13 +260,15 @@ RTR_API VkResult rtrBindAccelerationStructureMemory(RtrDevice device, uint32_t b
 
 /* The 64-bit reference for VkAccelerationStructureInstanceNV::accelerationStructureReference.
  * dataSize must be 8 or more. Counterpart: vkGetAccelerationStructureHandleNV. */
-RTR_API VkResult rtrGetAccelerationStructureHandle(RtrDevice device, RtrAccelerationStructure accelerationStructure,
+RTR_API VkResult rtrGetAccelerationStructureHandle(RtrDevice device,
+                                                   RtrAccelerationStructure accelerationStructure,
                                                    size_t dataSize, void* pData);
 
 /* What to write into a VK_DESCRIPTOR_TYPE_STORAGE_BUFFER descriptor where the shader
  * declares accelerationStructureNV/EXT. The _Null form needs any heap that was
  * initialised: rays traced into it miss. */
-RTR_API VkResult rtrGetAccelerationStructureDescriptor(RtrDevice device, RtrAccelerationStructure accelerationStructure,
+RTR_API VkResult rtrGetAccelerationStructureDescriptor(RtrDevice device,
+                                                       RtrAccelerationStructure accelerationStructure,
                                                        VkDescriptorBufferInfo* pInfo);
 RTR_API VkResult rtrGetNullAccelerationStructureDescriptor(RtrDevice device, RtrHeap heap,
                                                            VkDescriptorBufferInfo* pInfo);
@@ -292,7 +297,8 @@ RTR_API VkDeviceSize rtrGetRecorderControlSize(RtrDevice device, uint32_t launch
  * recorded. Counterpart: the ray tracing state of a VkCommandBuffer. */
 RTR_API VkResult rtrCreateRecorder(RtrDevice device, const RtrRecorderCreateInfo* pCreateInfo,
                                    const VkAllocationCallbacks* pAllocator, RtrRecorder* pRecorder);
-RTR_API void rtrDestroyRecorder(RtrDevice device, RtrRecorder recorder, const VkAllocationCallbacks* pAllocator);
+RTR_API void rtrDestroyRecorder(RtrDevice device, RtrRecorder recorder,
+                                const VkAllocationCallbacks* pAllocator);
 
 /* Records into `commandBuffer` from now on; it must be in the recording state, of a
  * compute-capable queue family, outside a render pass. Ray tracing bindings start
@@ -322,7 +328,8 @@ RTR_API VkResult rtrResetRecorder(RtrRecorder recorder);
  * Errors: VALIDATION_FAILED (counts above those of creation, unbound objects, update
  * without ALLOW_UPDATE or with changed geometry, misaligned offsets);
  * FEATURE_NOT_PRESENT naming the device limit an input exceeds. */
-RTR_API VkResult rtrCmdBuildAccelerationStructure(RtrRecorder recorder, const VkAccelerationStructureInfoNV* pInfo,
+RTR_API VkResult rtrCmdBuildAccelerationStructure(RtrRecorder recorder,
+                                                  const VkAccelerationStructureInfoNV* pInfo,
                                                   VkBuffer instanceData, VkDeviceSize instanceOffset,
                                                   VkBool32 update, RtrAccelerationStructure dst,
                                                   RtrAccelerationStructure src, VkBuffer scratch,
@@ -340,18 +347,18 @@ RTR_API VkResult rtrCmdCopyAccelerationStructure(RtrRecorder recorder, RtrAccele
  * VK_QUERY_TYPE_ACCELERATION_STRUCTURE_COMPACTED_SIZE_NV. Written in COMPUTE_SHADER.
  * Counterpart: vkCmdWriteAccelerationStructuresPropertiesNV, with a buffer in place
  * of the query pool. */
-RTR_API VkResult rtrCmdWriteAccelerationStructuresProperties(RtrRecorder recorder, uint32_t accelerationStructureCount,
-                                                             const RtrAccelerationStructure* pAccelerationStructures,
-                                                             VkQueryType queryType, VkBuffer dstBuffer,
-                                                             VkDeviceSize dstOffset);
+RTR_API VkResult rtrCmdWriteAccelerationStructuresProperties(
+    RtrRecorder recorder, uint32_t accelerationStructureCount,
+    const RtrAccelerationStructure* pAccelerationStructures, VkQueryType queryType, VkBuffer dstBuffer,
+    VkDeviceSize dstOffset);
 
 /* ---- Pipelines ---------------------------------------------------------------------- */
 
 typedef struct RtrRayTracingPipelineCreateInfo {
-    const void* pNext; /* must be NULL */
+    const void* pNext;           /* must be NULL */
     VkPipelineCreateFlags flags; /* e.g. DISABLE_OPTIMIZATION; no DERIVATIVE */
-    const uint32_t* pCode; /* a module that rtc linked, with its reflection */
-    size_t codeSize;       /* bytes */
+    const uint32_t* pCode;       /* a module that rtc linked, with its reflection */
+    size_t codeSize;             /* bytes */
     /* The application's set layouts, 0 to setLayoutCount-1. Ray tracing descriptors
      * have stageFlags with COMPUTE; acceleration structures are STORAGE_BUFFER. When the
      * module's reserved set is one of these, that layout must contain the bindings of
@@ -374,11 +381,13 @@ typedef struct RtrRayTracingPipelineCreateInfo {
 RTR_API VkResult rtrCreateRayTracingPipeline(RtrDevice device, VkPipelineCache pipelineCache,
                                              const RtrRayTracingPipelineCreateInfo* pCreateInfo,
                                              const VkAllocationCallbacks* pAllocator, RtrPipeline* pPipeline);
-RTR_API void rtrDestroyPipeline(RtrDevice device, RtrPipeline pipeline, const VkAllocationCallbacks* pAllocator);
+RTR_API void rtrDestroyPipeline(RtrDevice device, RtrPipeline pipeline,
+                                const VkAllocationCallbacks* pAllocator);
 
 /* dataSize >= groupCount * 32. Counterpart: vkGetRayTracingShaderGroupHandlesNV. */
-RTR_API VkResult rtrGetRayTracingShaderGroupHandles(RtrDevice device, RtrPipeline pipeline, uint32_t firstGroup,
-                                                    uint32_t groupCount, size_t dataSize, void* pData);
+RTR_API VkResult rtrGetRayTracingShaderGroupHandles(RtrDevice device, RtrPipeline pipeline,
+                                                    uint32_t firstGroup, uint32_t groupCount, size_t dataSize,
+                                                    void* pData);
 
 typedef struct RtrPipelineInfo {
     uint32_t moduleFlags; /* RTC_MODULE_* */
@@ -393,12 +402,12 @@ typedef struct RtrPipelineInfo {
     uint32_t callableWords;
     uint32_t reservedSet;
     uint32_t reservedBinding;
-    uint32_t usedBindings;        /* bit n: RTC_BINDING n */
-    VkBool32 reservedInAppSet;    /* the reserved bindings are in one of the application's sets */
-    RtrTraceOptions options;      /* in force; no defaults */
-    const char* pReflectionJson;  /* UTF-8, not terminated; lives as long as the pipeline */
+    uint32_t usedBindings;       /* bit n: RTC_BINDING n */
+    VkBool32 reservedInAppSet;   /* the reserved bindings are in one of the application's sets */
+    RtrTraceOptions options;     /* in force; no defaults */
+    const char* pReflectionJson; /* UTF-8, not terminated; lives as long as the pipeline */
     size_t reflectionJsonSize;
-    VkPipelineLayout layout;      /* the runtime's; for debugging and descriptor update templates */
+    VkPipelineLayout layout; /* the runtime's; for debugging and descriptor update templates */
     VkPipeline pipeline;
 } RtrPipelineInfo;
 
@@ -410,12 +419,13 @@ RTR_API void rtrGetPipelineInfo(RtrPipeline pipeline, RtrPipelineInfo* pInfo);
  * pBindings NULL returns the count (at most 9); *pSet receives the set index. The
  * dispatch parameters are a UNIFORM_BUFFER_DYNAMIC, so such a set cannot be
  * update-after-bind. Works on module words: the pipeline does not exist yet. */
-RTR_API VkResult rtrGetReservedBindings(RtrDevice device, const uint32_t* pCode, size_t codeSize, uint32_t* pSet,
-                                        uint32_t* pBindingCount, VkDescriptorSetLayoutBinding* pBindings);
+RTR_API VkResult rtrGetReservedBindings(RtrDevice device, const uint32_t* pCode, size_t codeSize,
+                                        uint32_t* pSet, uint32_t* pBindingCount,
+                                        VkDescriptorSetLayoutBinding* pBindings);
 
 typedef struct RtrReservedDescriptors {
     RtrHeap heap;
-    RtrRecorder recorder; /* its control region is bound */
+    RtrRecorder recorder;                                         /* its control region is bound */
     VkBuffer raygenBuffer, missBuffer, hitBuffer, callableBuffer; /* SBT buffers, bound whole; NULL: none */
     VkBuffer launchScratch; /* may be VK_NULL_HANDLE when scratchWords is 0 */
     VkDeviceSize launchScratchOffset, launchScratchSize;
@@ -431,9 +441,9 @@ RTR_API VkResult rtrWriteReservedDescriptors(RtrDevice device, RtrPipeline pipel
 #define RTR_NULL_GROUP 0xffffffffu
 
 typedef struct RtrSbtRecord {
-    uint32_t group;       /* index of a group of the pipeline; RTR_NULL_GROUP: an all-zero handle */
-    uint32_t dataSize;    /* bytes of application data after the handle */
-    const void* pData;    /* NULL with dataSize > 0: space is reserved and zeroed */
+    uint32_t group;    /* index of a group of the pipeline; RTR_NULL_GROUP: an all-zero handle */
+    uint32_t dataSize; /* bytes of application data after the handle */
+    const void* pData; /* NULL with dataSize > 0: space is reserved and zeroed */
 } RtrSbtRecord;
 
 typedef struct RtrSbtRegion {
@@ -475,17 +485,19 @@ RTR_API VkResult rtrCmdBindPipeline(RtrRecorder recorder, RtrPipeline pipeline);
  * with the layout of the pipeline of that moment. A set that holds the reserved bindings
  * must be the last of its call, and the dynamic offsets given here are those of the
  * application's own bindings only. */
-RTR_API VkResult rtrCmdBindDescriptorSets(RtrRecorder recorder, uint32_t firstSet, uint32_t descriptorSetCount,
-                                          const VkDescriptorSet* pDescriptorSets, uint32_t dynamicOffsetCount,
-                                          const uint32_t* pDynamicOffsets);
+RTR_API VkResult rtrCmdBindDescriptorSets(RtrRecorder recorder, uint32_t firstSet,
+                                          uint32_t descriptorSetCount, const VkDescriptorSet* pDescriptorSets,
+                                          uint32_t dynamicOffsetCount, const uint32_t* pDynamicOffsets);
 /* Counterpart: vkCmdPushConstants. offset and size are multiples of 4. Remembered. */
-RTR_API VkResult rtrCmdPushConstants(RtrRecorder recorder, uint32_t offset, uint32_t size, const void* pValues);
+RTR_API VkResult rtrCmdPushConstants(RtrRecorder recorder, uint32_t offset, uint32_t size,
+                                     const void* pValues);
 /* The heap whose acceleration structures the following launches use. */
 RTR_API VkResult rtrCmdSetHeap(RtrRecorder recorder, RtrHeap heap);
 /* Device memory for suspended lanes and deep stacks; see rtrGetLaunchScratchSize.
  * offset: a multiple of 256. Launches that use the same scratch need a barrier between
  * them (COMPUTE_SHADER, SHADER_READ | SHADER_WRITE). */
-RTR_API VkResult rtrCmdSetLaunchScratch(RtrRecorder recorder, VkBuffer buffer, VkDeviceSize offset, VkDeviceSize size);
+RTR_API VkResult rtrCmdSetLaunchScratch(RtrRecorder recorder, VkBuffer buffer, VkDeviceSize offset,
+                                        VkDeviceSize size);
 /* maxTileLanes: lanes of one dispatch, against driver watchdogs; 0: no limit.
  * maxRounds: dispatches of a resumable launch after which lanes still suspended are a
  * launch error (RTC_LAUNCH_ERROR_UNFINISHED); 0: 64. An unused round costs an empty
@@ -495,8 +507,8 @@ RTR_API VkResult rtrCmdSetLaunchLimits(RtrRecorder recorder, uint64_t maxTileLan
 /* Bytes of launch scratch the pipeline needs with the given extent. *pMinimum (may be
  * NULL) is what one workgroup needs: any size between the two works, in more tiles.
  * Both 0 when the module needs none. */
-RTR_API VkDeviceSize rtrGetLaunchScratchSize(RtrDevice device, RtrPipeline pipeline, uint32_t width, uint32_t height,
-                                             uint32_t depth, VkDeviceSize* pMinimum);
+RTR_API VkDeviceSize rtrGetLaunchScratchSize(RtrDevice device, RtrPipeline pipeline, uint32_t width,
+                                             uint32_t height, uint32_t depth, VkDeviceSize* pMinimum);
 
 /* Counterpart: vkCmdTraceRaysNV, same arguments. Buffers need STORAGE usage; offsets are
  * multiples of 64, strides of 32 and at most 4096; a NULL buffer is an empty region. Of
@@ -508,8 +520,9 @@ RTR_API VkDeviceSize rtrGetLaunchScratchSize(RtrDevice device, RtrPipeline pipel
 RTR_API VkResult rtrCmdTraceRays(RtrRecorder recorder, VkBuffer raygenBuffer, VkDeviceSize raygenOffset,
                                  VkBuffer missBuffer, VkDeviceSize missOffset, VkDeviceSize missStride,
                                  VkBuffer hitBuffer, VkDeviceSize hitOffset, VkDeviceSize hitStride,
-                                 VkBuffer callableBuffer, VkDeviceSize callableOffset, VkDeviceSize callableStride,
-                                 uint32_t width, uint32_t height, uint32_t depth);
+                                 VkBuffer callableBuffer, VkDeviceSize callableOffset,
+                                 VkDeviceSize callableStride, uint32_t width, uint32_t height,
+                                 uint32_t depth);
 
 /* VkStridedDeviceAddressRegionKHR with a buffer in place of the address. */
 typedef struct RtrStridedBufferRegion {
@@ -521,16 +534,18 @@ typedef struct RtrStridedBufferRegion {
 
 /* Counterpart: vkCmdTraceRaysKHR. NULL regions are empty; raygen must not be. */
 RTR_API VkResult rtrCmdTraceRaysRegions(RtrRecorder recorder, const RtrStridedBufferRegion* pRaygen,
-                                        const RtrStridedBufferRegion* pMiss, const RtrStridedBufferRegion* pHit,
-                                        const RtrStridedBufferRegion* pCallable, uint32_t width, uint32_t height,
-                                        uint32_t depth);
+                                        const RtrStridedBufferRegion* pMiss,
+                                        const RtrStridedBufferRegion* pHit,
+                                        const RtrStridedBufferRegion* pCallable, uint32_t width,
+                                        uint32_t height, uint32_t depth);
 
 /* Counterpart: vkCmdTraceRaysIndirectKHR, with a buffer and offset (STORAGE usage; a
  * multiple of 4) that hold a VkTraceRaysIndirectCommandKHR, read in COMPUTE_SHADER with
  * SHADER_READ. The largest extents size scratch, tiles and the dispatch; extents with more
  * lanes than those trace nothing and set the launch error UNFINISHED. */
 RTR_API VkResult rtrCmdTraceRaysIndirect(RtrRecorder recorder, const RtrStridedBufferRegion* pRaygen,
-                                         const RtrStridedBufferRegion* pMiss, const RtrStridedBufferRegion* pHit,
+                                         const RtrStridedBufferRegion* pMiss,
+                                         const RtrStridedBufferRegion* pHit,
                                          const RtrStridedBufferRegion* pCallable, VkBuffer indirectBuffer,
                                          VkDeviceSize indirectOffset, uint32_t maxWidth, uint32_t maxHeight,
                                          uint32_t maxDepth);
@@ -546,14 +561,15 @@ RTR_API VkResult rtrCmdTraceRaysIndirect(RtrRecorder recorder, const RtrStridedB
 RTR_API uint32_t rtrGetLaunchCount(RtrRecorder recorder);
 /* Where launch `index`'s block lies (buffer, offset in the buffer, bytes); only its first
  * RTR_LAUNCH_ERROR_BYTES are needed to decode. */
-RTR_API VkResult rtrGetLaunchErrorLocation(RtrRecorder recorder, uint32_t index, VkDescriptorBufferInfo* pInfo);
+RTR_API VkResult rtrGetLaunchErrorLocation(RtrRecorder recorder, uint32_t index,
+                                           VkDescriptorBufferInfo* pInfo);
 #define RTR_LAUNCH_ERROR_BYTES 32u
 
 typedef struct RtrLaunchError {
-    uint32_t code;  /* RTC_LAUNCH_ERROR_*; the first one seen */
-    uint32_t count; /* events of all kinds */
-    uint32_t launchId[3]; /* of the first */
-    uint32_t detail[2];   /* by code, see abi.h */
+    uint32_t code;           /* RTC_LAUNCH_ERROR_*; the first one seen */
+    uint32_t count;          /* events of all kinds */
+    uint32_t launchId[3];    /* of the first */
+    uint32_t detail[2];      /* by code, see abi.h */
     uint32_t suspendedLanes; /* lanes (an upper bound) that did not finish */
 } RtrLaunchError;
 
@@ -564,20 +580,21 @@ RTR_API VkResult rtrDecodeLaunchError(const uint32_t* words, RtrLaunchError* pEr
 RTR_API void rtrFormatLaunchError(const RtrLaunchError* pError, char* text, size_t size);
 /* The same from mapped memory: `pMapped` is the mapped start of the control BUFFER.
  * Reports an error through the messenger too. */
-RTR_API VkResult rtrGetLaunchError(RtrRecorder recorder, uint32_t index, const void* pMapped, RtrLaunchError* pError);
+RTR_API VkResult rtrGetLaunchError(RtrRecorder recorder, uint32_t index, const void* pMapped,
+                                   RtrLaunchError* pError);
 
 /* ---- Float probe ------------------------------------------------------------------------
  * What the device's float arithmetic does, for rtc-info and bug reports. */
 
 typedef struct RtrFloatProbe {
-    VkBool32 contractsUnmarked;   /* a*b+c without NoContraction is fused */
-    VkBool32 contractsPrecise;    /* with NoContraction: must be false, or watertightness is lost */
+    VkBool32 contractsUnmarked; /* a*b+c without NoContraction is fused */
+    VkBool32 contractsPrecise;  /* with NoContraction: must be false, or watertightness is lost */
     VkBool32 fmaIsFused;
     VkBool32 flushesDenormals;    /* denormal results become 0 */
     VkBool32 roundsToNearestEven; /* add and mul */
     VkBool32 exactDivision;       /* 1/3, 1/7, ... correctly rounded */
     VkBool32 keepsSignedZero;
-    VkBool32 nanFailsComparison;  /* NaN < 1 and NaN >= 1 are both false */
+    VkBool32 nanFailsComparison; /* NaN < 1 and NaN >= 1 are both false */
 } RtrFloatProbe;
 #define RTR_FLOAT_PROBE_BYTES 64u
 

@@ -13,7 +13,8 @@ std::vector<Vec3> soup(size_t count, uint32_t seed, float size = 0.05f) {
     std::vector<Vec3> v;
     for (size_t i = 0; i < count; i++) {
         Vec3 c{u(rng), u(rng), u(rng)};
-        for (int k = 0; k < 3; k++) v.push_back({c.x + size * u(rng), c.y + size * u(rng), c.z + size * u(rng)});
+        for (int k = 0; k < 3; k++)
+            v.push_back({c.x + size * u(rng), c.y + size * u(rng), c.z + size * u(rng)});
     }
     return v;
 }
@@ -42,11 +43,13 @@ INSTANTIATE_TEST_SUITE_P(Builders, BuildTest, ::testing::Values(0, 1), [](const 
 });
 
 TEST_P(BuildTest, AwkwardCounts) {
-    for (size_t n : {1, 2, 3, 4, 5, 7, 8, 9, 31, 32, 33, 255, 256, 257, 511, 513, 1023, 1025, 2047, 2048, 2049, 5000}) {
+    for (size_t n :
+         {1, 2, 3, 4, 5, 7, 8, 9, 31, 32, 33, 255, 256, 257, 511, 513, 1023, 1025, 2047, 2048, 2049, 5000}) {
         SCOPED_TRACE(n);
         Scene scene(*vk, rtr, 1 << 20);
         auto vertices = soup(n, static_cast<uint32_t>(n));
-        auto as = scene.build_bottom({scene.triangles(vertices, nullptr, VK_GEOMETRY_OPAQUE_BIT_NV)}, flags());
+        auto as =
+            scene.build_bottom({scene.triangles(vertices, nullptr, VK_GEOMETRY_OPAQUE_BIT_NV)}, flags());
         TreeFacts facts;
         check_structure(scene, as, facts);
         expect_slots(facts, vertices, RTC_SLOT_OPAQUE);
@@ -178,8 +181,9 @@ TEST_P(BuildTest, InactiveAndDegenerate) {
     for (bool update : {false, true}) {
         SCOPED_TRACE(update);
         Scene scene(*vk, rtr, 1 << 20);
-        auto as = scene.build_bottom({scene.triangles(vertices)},
-                                     flags() | (update ? VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV : 0));
+        auto as =
+            scene.build_bottom({scene.triangles(vertices)},
+                               flags() | (update ? VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV : 0));
         TreeFacts facts;
         check_structure(scene, as, facts);
         EXPECT_EQ(scene.words(as)[RTC_HDR_ACTIVE_COUNT], update ? 30u : 20u);
@@ -265,9 +269,11 @@ TEST_P(BuildTest, VertexFormats) {
         int components;
         bool half, wide;
     };
-    for (Case c : {Case{VK_FORMAT_R32G32_SFLOAT, 2, false, true}, Case{VK_FORMAT_R16G16B16_SFLOAT, 3, true, false},
-                   Case{VK_FORMAT_R16G16_SFLOAT, 2, true, false}, Case{VK_FORMAT_R16G16B16_SNORM, 3, false, false},
-                   Case{VK_FORMAT_R16G16_SNORM, 2, false, false}, Case{VK_FORMAT_R16G16B16A16_SFLOAT, 3, true, false}}) {
+    for (Case c :
+         {Case{VK_FORMAT_R32G32_SFLOAT, 2, false, true}, Case{VK_FORMAT_R16G16B16_SFLOAT, 3, true, false},
+          Case{VK_FORMAT_R16G16_SFLOAT, 2, true, false}, Case{VK_FORMAT_R16G16B16_SNORM, 3, false, false},
+          Case{VK_FORMAT_R16G16_SNORM, 2, false, false},
+          Case{VK_FORMAT_R16G16B16A16_SFLOAT, 3, true, false}}) {
         SCOPED_TRACE(c.format);
         Scene scene(*vk, rtr, 1 << 16);
         const float values[3][3] = {{1, 0, -1}, {0, 1, 1}, {-1, -1, 0}};
@@ -279,7 +285,10 @@ TEST_P(BuildTest, VertexFormats) {
                 if (c.wide) {
                     memcpy(&raw[4 + v * stride + 4 * k], &f, 4);
                 } else {
-                    uint16_t h = c.half ? (f == 1 ? 0x3c00 : f == -1 ? 0xbc00 : 0) : static_cast<uint16_t>(int16_t(f * 32767));
+                    uint16_t h = c.half ? (f == 1    ? 0x3c00
+                                           : f == -1 ? 0xbc00
+                                                     : 0)
+                                        : static_cast<uint16_t>(int16_t(f * 32767));
                     memcpy(&raw[2 + v * stride + 2 * k], &h, 2);
                 }
             }
@@ -307,8 +316,8 @@ TEST_P(BuildTest, BadReferencesAreNeverFollowed) {
     Scene scene(*vk, rtr, 1 << 16);
     auto leaf = scene.build_bottom({scene.triangles(soup(5, 1))}, flags());
     std::vector<VkAccelerationStructureInstanceNV> list(4, scene.instance(leaf));
-    list[1].accelerationStructureReference += 1;         // inside something
-    list[2].accelerationStructureReference = 1u << 30;   // beyond the heap
+    list[1].accelerationStructureReference += 1;        // inside something
+    list[2].accelerationStructureReference = 1u << 30;  // beyond the heap
     list[3].accelerationStructureReference = 1ull << 40;
     auto as = scene.build_top(list, flags());
     TreeFacts facts;
@@ -396,7 +405,8 @@ TEST_P(BuildTest, Instances) {
 
 TEST_P(BuildTest, TopLevelFacts) {
     Scene scene(*vk, rtr, 1 << 20);
-    auto opaque = scene.build_bottom({scene.triangles(soup(5, 1), nullptr, VK_GEOMETRY_OPAQUE_BIT_NV)}, flags());
+    auto opaque =
+        scene.build_bottom({scene.triangles(soup(5, 1), nullptr, VK_GEOMETRY_OPAQUE_BIT_NV)}, flags());
     auto clear = scene.build_bottom({scene.triangles(soup(5, 2))}, flags());
     const uint32_t all = RTC_FACT_ALL_OPAQUE | RTC_FACT_IDENTITY_TRANSFORMS | RTC_FACT_FULL_MASKS |
                          RTC_FACT_NO_INSTANCE_FLAGS | RTC_FACT_HAS_TRIANGLES;

@@ -13,7 +13,8 @@ std::vector<Vec3> ball(size_t count, uint32_t seed, float reach, float size = 0.
     std::vector<Vec3> v;
     for (size_t i = 0; i < count; i++) {
         Vec3 c{reach * u(rng), reach * u(rng), reach * u(rng)};
-        for (int k = 0; k < 3; k++) v.push_back({c.x + size * u(rng), c.y + size * u(rng), c.z + size * u(rng)});
+        for (int k = 0; k < 3; k++)
+            v.push_back({c.x + size * u(rng), c.y + size * u(rng), c.z + size * u(rng)});
     }
     return v;
 }
@@ -25,7 +26,8 @@ class CopyTest : public RuntimeTest {
         RtrAccelerationStructure list[2] = {as, as};
         scene.run([&] {
             EXPECT_EQ(rtrCmdWriteAccelerationStructuresProperties(
-                          scene.recorder, 2, list, VK_QUERY_TYPE_ACCELERATION_STRUCTURE_COMPACTED_SIZE_NV, out.handle, 248),
+                          scene.recorder, 2, list, VK_QUERY_TYPE_ACCELERATION_STRUCTURE_COMPACTED_SIZE_NV,
+                          out.handle, 248),
                       VK_SUCCESS);
         });
         EXPECT_EQ(*out.as<uint64_t>(248), *out.as<uint64_t>(256));
@@ -52,10 +54,12 @@ TEST_F(CopyTest, CompactKeepsTheTree) {
         VkDeviceSize size = compacted_size(scene, as);
         EXPECT_EQ(size, scene.words(as)[RTC_HDR_SIZE_QUADS] * 16u);
         VkAccelerationStructureInfoNV info{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV};
-        info.type = kind == 2 ? VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV : VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_NV;
+        info.type = kind == 2 ? VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV
+                              : VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_NV;
         auto small = scene.create(info, size);
         scene.run([&] {
-            EXPECT_EQ(rtrCmdCopyAccelerationStructure(scene.recorder, small, as, VK_COPY_ACCELERATION_STRUCTURE_MODE_COMPACT_NV),
+            EXPECT_EQ(rtrCmdCopyAccelerationStructure(scene.recorder, small, as,
+                                                      VK_COPY_ACCELERATION_STRUCTURE_MODE_COMPACT_NV),
                       VK_SUCCESS);
         });
         check_structure(scene, small, after);
@@ -67,7 +71,8 @@ TEST_F(CopyTest, CompactKeepsTheTree) {
         // A clone of the compacted one, and its compaction again, are the same size.
         auto clone = scene.create(info, size);
         scene.run([&] {
-            EXPECT_EQ(rtrCmdCopyAccelerationStructure(scene.recorder, clone, small, VK_COPY_ACCELERATION_STRUCTURE_MODE_CLONE_NV),
+            EXPECT_EQ(rtrCmdCopyAccelerationStructure(scene.recorder, clone, small,
+                                                      VK_COPY_ACCELERATION_STRUCTURE_MODE_CLONE_NV),
                       VK_SUCCESS);
         });
         check_structure(scene, clone, cloned);
@@ -84,7 +89,8 @@ TEST_F(CopyTest, RefitFollowsTheVertices) {
             auto a = ball(2000, 3, 1), b = ball(700, 4, 1);
             std::vector<uint32_t> indices;
             for (uint32_t i = 0; i < 2100; i++) indices.push_back(2099 - i);
-            std::vector<VkGeometryNV> geometry{scene.triangles(a), scene.triangles(b, &indices, VK_GEOMETRY_OPAQUE_BIT_NV)};
+            std::vector<VkGeometryNV> geometry{scene.triangles(a),
+                                               scene.triangles(b, &indices, VK_GEOMETRY_OPAQUE_BIT_NV)};
             auto as = scene.build_bottom(geometry, static_cast<VkBuildAccelerationStructureFlagsNV>(flags));
             TreeFacts before, after;
             check_structure(scene, as, before);
@@ -99,8 +105,8 @@ TEST_F(CopyTest, RefitFollowsTheVertices) {
             auto dst = in_place ? as : scene.create(info);
             Buffer scratch = vk->buffer(scene.scratch_size(as, true), RTR_SCRATCH_BUFFER_USAGE);
             scene.run([&] {
-                EXPECT_EQ(rtrCmdBuildAccelerationStructure(scene.recorder, &info, VK_NULL_HANDLE, 0, VK_TRUE, dst,
-                                                           in_place ? nullptr : as, scratch.handle, 0),
+                EXPECT_EQ(rtrCmdBuildAccelerationStructure(scene.recorder, &info, VK_NULL_HANDLE, 0, VK_TRUE,
+                                                           dst, in_place ? nullptr : as, scratch.handle, 0),
                           VK_SUCCESS);
             });
             check_structure(scene, dst, after);
@@ -109,7 +115,8 @@ TEST_F(CopyTest, RefitFollowsTheVertices) {
                 bool second = s.geometry_word & RTC_SLOT_GEOMETRY_MASK;
                 EXPECT_EQ(s.geometry_word, second ? 1u | RTC_SLOT_OPAQUE : 0u);
                 for (uint32_t k = 0; k < 3; k++) {
-                    const Vec3& v = second ? moved_b[2099 - (3 * s.primitive + k)] : moved_a[3 * s.primitive + k];
+                    const Vec3& v =
+                        second ? moved_b[2099 - (3 * s.primitive + k)] : moved_a[3 * s.primitive + k];
                     EXPECT_EQ(memcmp(&v, &s.v[k], 12), 0);
                 }
             }
@@ -139,7 +146,8 @@ TEST_F(CopyTest, RefitOfInstancesAndBoxes) {
     for (int i = 0; i < 50; i++) instances[static_cast<size_t>(i)].transform.matrix[0][3] = -3.0f * i;
     instances[9].mask = 1;
     Buffer data = scene.upload(instances.data(), instances.size() * sizeof instances[0]);
-    VkAccelerationStructureInfoNV bottom_info{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV}, top_info = bottom_info;
+    VkAccelerationStructureInfoNV bottom_info{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV},
+        top_info = bottom_info;
     bottom_info.type = VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_NV;
     bottom_info.flags = top_info.flags = flags;
     bottom_info.geometryCount = 1;
@@ -147,12 +155,12 @@ TEST_F(CopyTest, RefitOfInstancesAndBoxes) {
     top_info.type = VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV;
     top_info.instanceCount = 50;
     scene.run([&] {
-        EXPECT_EQ(rtrCmdBuildAccelerationStructure(scene.recorder, &bottom_info, VK_NULL_HANDLE, 0, VK_TRUE, leaf, leaf,
-                                                   scene.scratch.handle, 0),
+        EXPECT_EQ(rtrCmdBuildAccelerationStructure(scene.recorder, &bottom_info, VK_NULL_HANDLE, 0, VK_TRUE,
+                                                   leaf, leaf, scene.scratch.handle, 0),
                   VK_SUCCESS);
         vk->compute_barrier();
-        EXPECT_EQ(rtrCmdBuildAccelerationStructure(scene.recorder, &top_info, data.handle, 0, VK_TRUE, top, top,
-                                                   scene.scratch.handle, 0),
+        EXPECT_EQ(rtrCmdBuildAccelerationStructure(scene.recorder, &top_info, data.handle, 0, VK_TRUE, top,
+                                                   top, scene.scratch.handle, 0),
                   VK_SUCCESS);
     });
     TreeFacts bottom_facts, top_facts;
@@ -188,7 +196,8 @@ TEST_F(CopyTest, WrongUsesAreNamed) {
         info.pGeometries = larger.data();
         EXPECT_EQ(build(VK_FALSE, 0), VK_ERROR_VALIDATION_FAILED_EXT);
         expect_runtime_error("as-geometry");
-        EXPECT_EQ(rtrCmdCopyAccelerationStructure(scene.recorder, as, as, VK_COPY_ACCELERATION_STRUCTURE_MODE_CLONE_NV),
+        EXPECT_EQ(rtrCmdCopyAccelerationStructure(scene.recorder, as, as,
+                                                  VK_COPY_ACCELERATION_STRUCTURE_MODE_CLONE_NV),
                   VK_ERROR_VALIDATION_FAILED_EXT);
         expect_runtime_error("copy");
     });
@@ -207,8 +216,8 @@ TEST_F(CopyTest, WrongUsesAreNamed) {
         expect(id, result);
         create.info.pGeometries = geometry.data();
     };
-    with([](VkGeometryNV& g) { g.geometry.triangles.vertexFormat = VK_FORMAT_R8G8B8A8_UNORM; }, "vertex-format",
-         VK_ERROR_FEATURE_NOT_PRESENT);
+    with([](VkGeometryNV& g) { g.geometry.triangles.vertexFormat = VK_FORMAT_R8G8B8A8_UNORM; },
+         "vertex-format", VK_ERROR_FEATURE_NOT_PRESENT);
     with([](VkGeometryNV& g) { g.geometry.triangles.vertexStride = 11; }, "vertex-stride");
     with([](VkGeometryNV& g) { g.geometry.triangles.vertexOffset = 2; }, "vertex-offset");
     with([](VkGeometryNV& g) { g.geometry.triangles.vertexCount = 31; }, "vertex-count");

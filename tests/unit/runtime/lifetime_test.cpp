@@ -16,7 +16,8 @@ class Counter {
   public:
     Counter() {
         callbacks.pUserData = this;
-        callbacks.pfnAllocation = [](void* user, size_t size, size_t alignment, VkSystemAllocationScope) -> void* {
+        callbacks.pfnAllocation = [](void* user, size_t size, size_t alignment,
+                                     VkSystemAllocationScope) -> void* {
             auto* self = static_cast<Counter*>(user);
             std::lock_guard lock(self->mutex_);
             void* p = std::aligned_alloc(std::max<size_t>(alignment, 16), (size + 63) / 64 * 64);
@@ -66,7 +67,8 @@ TEST_F(LifetimeTest, AllocationsGoThroughTheCallbacks) {
     RtrDevice device = nullptr;
     ASSERT_EQ(rtrCreateDevice(&info, &device_counter.callbacks, &device), VK_SUCCESS);
     EXPECT_GT(device_counter.total, 0);
-    Buffer buffer = vk->buffer(1 << 20, RTR_HEAP_BUFFER_USAGE), control = vk->buffer(1 << 16, RTR_CONTROL_BUFFER_USAGE);
+    Buffer buffer = vk->buffer(1 << 20, RTR_HEAP_BUFFER_USAGE),
+           control = vk->buffer(1 << 16, RTR_CONTROL_BUFFER_USAGE);
     for (auto* a : {static_cast<const VkAllocationCallbacks*>(nullptr),
                     static_cast<const VkAllocationCallbacks*>(&object_counter.callbacks)}) {
         int before = device_counter.total;
@@ -90,8 +92,8 @@ TEST_F(LifetimeTest, AllocationsGoThroughTheCallbacks) {
         vk->begin();
         rtrBeginRecorder(recorder, vk->cmd);
         for (int i = 0; i < 100; i++) {
-            EXPECT_EQ(rtrCmdBuildAccelerationStructure(recorder, &create.info, VK_NULL_HANDLE, 0, VK_FALSE, as, nullptr,
-                                                       scratch.handle, 0),
+            EXPECT_EQ(rtrCmdBuildAccelerationStructure(recorder, &create.info, VK_NULL_HANDLE, 0, VK_FALSE,
+                                                       as, nullptr, scratch.handle, 0),
                       VK_SUCCESS);
             vk->compute_barrier();
         }
@@ -101,8 +103,10 @@ TEST_F(LifetimeTest, AllocationsGoThroughTheCallbacks) {
         rtrDestroyHeap(device, heap, a);
         vk->destroy(scratch);
         EXPECT_EQ(object_counter.live(), 0u);
-        if (a) EXPECT_GT(object_counter.total, 0);
-        else EXPECT_GT(device_counter.total, before);
+        if (a)
+            EXPECT_GT(object_counter.total, 0);
+        else
+            EXPECT_GT(device_counter.total, before);
     }
     rtrDestroyDevice(device, &device_counter.callbacks);
     EXPECT_EQ(device_counter.live(), 0u);
@@ -172,12 +176,13 @@ TEST_F(LifetimeTest, ThreadsRecordAtTheSameTime) {
             VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
             vk->BeginCommandBuffer(w.cmd, &begin);
             EXPECT_EQ(rtrBeginRecorder(w.recorder, w.cmd), VK_SUCCESS);
-            EXPECT_EQ(rtrCmdBuildAccelerationStructure(w.recorder, &info, VK_NULL_HANDLE, 0, VK_FALSE, w.as, nullptr,
-                                                       w.scratch.handle, 0),
+            EXPECT_EQ(rtrCmdBuildAccelerationStructure(w.recorder, &info, VK_NULL_HANDLE, 0, VK_FALSE, w.as,
+                                                       nullptr, w.scratch.handle, 0),
                       VK_SUCCESS);
-            VkMemoryBarrier b{VK_STRUCTURE_TYPE_MEMORY_BARRIER, nullptr, VK_ACCESS_MEMORY_WRITE_BIT, VK_ACCESS_HOST_READ_BIT};
-            vk->CmdPipelineBarrier(w.cmd, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, VK_PIPELINE_STAGE_HOST_BIT, 0, 1, &b, 0,
-                                   nullptr, 0, nullptr);
+            VkMemoryBarrier b{VK_STRUCTURE_TYPE_MEMORY_BARRIER, nullptr, VK_ACCESS_MEMORY_WRITE_BIT,
+                              VK_ACCESS_HOST_READ_BIT};
+            vk->CmdPipelineBarrier(w.cmd, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, VK_PIPELINE_STAGE_HOST_BIT, 0,
+                                   1, &b, 0, nullptr, 0, nullptr);
             vk->EndCommandBuffer(w.cmd);
         });
     }
@@ -201,7 +206,9 @@ TEST_F(LifetimeTest, ThreadsRecordAtTheSameTime) {
 
 TEST_F(LifetimeTest, SupportNamesItsRequirements) {
     RtrPhysicalDeviceSupport support;
-    ASSERT_EQ(rtrGetPhysicalDeviceSupport(vk->instance, vk->physical_device, vk->get_instance_proc_addr, &support), VK_SUCCESS);
+    ASSERT_EQ(
+        rtrGetPhysicalDeviceSupport(vk->instance, vk->physical_device, vk->get_instance_proc_addr, &support),
+        VK_SUCCESS);
     EXPECT_TRUE(support.supported);
     ASSERT_GT(support.requirementCount, 5u);
     for (uint32_t i = 0; i < support.requirementCount; i++) {
@@ -217,17 +224,23 @@ TEST_F(LifetimeTest, SupportNamesItsRequirements) {
 }
 
 TEST_F(LifetimeTest, EnumsBecomeValidOnes) {
-    EXPECT_EQ(rtrTranslateBufferUsage(VK_BUFFER_USAGE_RAY_TRACING_BIT_NV | VK_BUFFER_USAGE_VERTEX_BUFFER_BIT) &
-                  VK_BUFFER_USAGE_RAY_TRACING_BIT_NV, 0u);
-    EXPECT_TRUE(rtrTranslateBufferUsage(VK_BUFFER_USAGE_RAY_TRACING_BIT_NV) & VK_BUFFER_USAGE_STORAGE_BUFFER_BIT);
-    EXPECT_EQ(rtrTranslateBufferUsage(VK_BUFFER_USAGE_VERTEX_BUFFER_BIT), VkBufferUsageFlags(VK_BUFFER_USAGE_VERTEX_BUFFER_BIT));
+    EXPECT_EQ(
+        rtrTranslateBufferUsage(VK_BUFFER_USAGE_RAY_TRACING_BIT_NV | VK_BUFFER_USAGE_VERTEX_BUFFER_BIT) &
+            VK_BUFFER_USAGE_RAY_TRACING_BIT_NV,
+        0u);
+    EXPECT_TRUE(rtrTranslateBufferUsage(VK_BUFFER_USAGE_RAY_TRACING_BIT_NV) &
+                VK_BUFFER_USAGE_STORAGE_BUFFER_BIT);
+    EXPECT_EQ(rtrTranslateBufferUsage(VK_BUFFER_USAGE_VERTEX_BUFFER_BIT),
+              VkBufferUsageFlags(VK_BUFFER_USAGE_VERTEX_BUFFER_BIT));
     EXPECT_EQ(rtrTranslatePipelineStages(VK_PIPELINE_STAGE_RAY_TRACING_SHADER_BIT_NV),
               VkPipelineStageFlags(VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT));
     EXPECT_EQ(rtrTranslateShaderStages(VK_SHADER_STAGE_RAYGEN_BIT_NV | VK_SHADER_STAGE_VERTEX_BIT),
               VkShaderStageFlags(VK_SHADER_STAGE_COMPUTE_BIT | VK_SHADER_STAGE_VERTEX_BIT));
     EXPECT_EQ(rtrTranslateShaderStages(VK_SHADER_STAGE_ALL), VkShaderStageFlags(VK_SHADER_STAGE_ALL));
-    EXPECT_EQ(rtrTranslateAccess(VK_ACCESS_ACCELERATION_STRUCTURE_READ_BIT_NV), VkAccessFlags(VK_ACCESS_SHADER_READ_BIT));
-    EXPECT_EQ(rtrTranslateDescriptorType(VK_DESCRIPTOR_TYPE_ACCELERATION_STRUCTURE_NV), VK_DESCRIPTOR_TYPE_STORAGE_BUFFER);
+    EXPECT_EQ(rtrTranslateAccess(VK_ACCESS_ACCELERATION_STRUCTURE_READ_BIT_NV),
+              VkAccessFlags(VK_ACCESS_SHADER_READ_BIT));
+    EXPECT_EQ(rtrTranslateDescriptorType(VK_DESCRIPTOR_TYPE_ACCELERATION_STRUCTURE_NV),
+              VK_DESCRIPTOR_TYPE_STORAGE_BUFFER);
     EXPECT_EQ(rtrTranslateDescriptorType(VK_DESCRIPTOR_TYPE_SAMPLER), VK_DESCRIPTOR_TYPE_SAMPLER);
 }
 

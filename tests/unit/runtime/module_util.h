@@ -14,8 +14,7 @@ inline std::string base64(const std::string& in) {
     for (size_t i = 0; i < in.size(); i += 3) {
         auto at = [&](size_t k) { return k < in.size() ? static_cast<unsigned char>(in[k]) : 0u; };
         unsigned group = at(i) << 16 | at(i + 1) << 8 | at(i + 2);
-        for (int k = 0; k < 4; k++)
-            out += i + k > in.size() ? '=' : table[group >> (18 - 6 * k) & 63];
+        for (int k = 0; k < 4; k++) out += i + k > in.size() ? '=' : table[group >> (18 - 6 * k) & 63];
     }
     return out;
 }
@@ -50,7 +49,8 @@ inline std::vector<uint32_t> with_reflection(const uint32_t* words, size_t bytes
     for (uint32_t c = 0; c < chunks; c++) {
         size_t step = (blob.size() / chunks + 2) / 3 * 3, begin = std::min(blob.size(), c * step);
         std::string part = blob.substr(begin, c + 1 == chunks ? std::string::npos : step);
-        std::string text = "rtc.reflection:" + std::to_string(c) + "/" + std::to_string(chunks) + ":" + base64(part);
+        std::string text =
+            "rtc.reflection:" + std::to_string(c) + "/" + std::to_string(chunks) + ":" + base64(part);
         std::vector<uint32_t> literal(text.size() / 4 + 1);
         memcpy(literal.data(), text.data(), text.size());
         strings.push_back(static_cast<uint32_t>(literal.size() + 2) << 16 | 7);
@@ -59,7 +59,8 @@ inline std::vector<uint32_t> with_reflection(const uint32_t* words, size_t bytes
     }
     // The runtime's specialisation constants, see reserved_set.glsl.
     for (size_t i = 5; i < out.size() && (out[i] >> 16); i += out[i] >> 16) {
-        if ((out[i] & 0xffff) == 71 && out[i + 2] == 1 && out[i + 3] >= 1900) out[i + 3] += RTC_SPEC_BASE - 1900;
+        if ((out[i] & 0xffff) == 71 && out[i + 2] == 1 && out[i + 3] >= 1900)
+            out[i + 3] += RTC_SPEC_BASE - 1900;
     }
     size_t at = 5;
     while (at < out.size() && (out[at] & 0xffff) != 3) at += out[at] >> 16;

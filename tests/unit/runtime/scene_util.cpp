@@ -195,8 +195,11 @@ class Walker {
         for (size_t s = 0; s < seen_slots_.size(); s++) {
             reached += seen_slots_[s];
             EXPECT_LE(seen_slots_[s], 1u);
-            if (!top_) EXPECT_EQ(seen_slots_[s], 1u) << "slot " << s;
-            else EXPECT_EQ(seen_slots_[s], instance_active(static_cast<uint32_t>(s)) ? 1u : 0u) << "instance " << s;
+            if (!top_)
+                EXPECT_EQ(seen_slots_[s], 1u) << "slot " << s;
+            else
+                EXPECT_EQ(seen_slots_[s], instance_active(static_cast<uint32_t>(s)) ? 1u : 0u)
+                    << "instance " << s;
         }
         EXPECT_EQ(reached, w_[RTC_HDR_ACTIVE_COUNT]);
         EXPECT_EQ(facts_.depth, w_[RTC_HDR_MAX_DEPTH]);
@@ -249,7 +252,8 @@ class Walker {
             if (!(ref & RTC_REF_LEAF)) {
                 walk(ref, depth + 1, tight, unused);
             } else {
-                uint32_t count = (ref >> RTC_REF_COUNT_SHIFT) & RTC_REF_COUNT_MASK, first = ref & RTC_REF_INDEX_MASK;
+                uint32_t count = (ref >> RTC_REF_COUNT_SHIFT) & RTC_REF_COUNT_MASK,
+                         first = ref & RTC_REF_INDEX_MASK;
                 if (count == 0) continue;
                 EXPECT_LE(count, RTC_MAX_LEAF_SLOTS);
                 facts_.leaves++;

@@ -12,8 +12,9 @@
 
 namespace {
 
-constexpr uint32_t kAllUsed = 1u << RTC_BINDING_PARAMS | 1u << RTC_BINDING_HEAP_TEXELS | 1u << RTC_BINDING_HEAP |
-                              1u << RTC_BINDING_SBT_RAYGEN | 1u << RTC_BINDING_SBT_HIT | 1u << RTC_BINDING_CONTROL |
+constexpr uint32_t kAllUsed = 1u << RTC_BINDING_PARAMS | 1u << RTC_BINDING_HEAP_TEXELS |
+                              1u << RTC_BINDING_HEAP | 1u << RTC_BINDING_SBT_RAYGEN |
+                              1u << RTC_BINDING_SBT_HIT | 1u << RTC_BINDING_CONTROL |
                               1u << RTC_BINDING_SCRATCH;
 
 class TraceTest : public RuntimeTest {
@@ -60,7 +61,8 @@ class TraceTest : public RuntimeTest {
         vk->UpdateDescriptorSets(vk->device, 1, &w, 0, nullptr);
     }
 
-    VkResult make_pipeline(const std::vector<uint32_t>& code, uint32_t push_bytes, const RtrTraceOptions* options = nullptr,
+    VkResult make_pipeline(const std::vector<uint32_t>& code, uint32_t push_bytes,
+                           const RtrTraceOptions* options = nullptr,
                            const VkSpecializationInfo* specialization = nullptr) {
         VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, push_bytes};
         RtrRayTracingPipelineCreateInfo info{};
@@ -103,7 +105,8 @@ double closest(const Ray& r, const std::vector<FlatTriangle>& triangles) {
             tv[k] = r.o[k] - t.v[0][k];
         }
         auto cross = [](const double* a, const auto* b, double* c) {
-            for (int k = 0; k < 3; k++) c[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
+            for (int k = 0; k < 3; k++)
+                c[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
         };
         auto dot = [](const double* a, const auto* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; };
         double d[3] = {r.d[0], r.d[1], r.d[2]};
@@ -179,12 +182,14 @@ TEST_F(TraceTest, ClosestHitsMatchBruteForce) {
             write(2, {hit_buffer.handle, 0, VK_WHOLE_SIZE});
 
             RtcModuleHeader h0 = module_header(1u << RTC_BINDING_PARAMS | 1u << RTC_BINDING_HEAP_TEXELS |
-                                                   1u << RTC_BINDING_HEAP | 1u << RTC_BINDING_CONTROL, 1);
+                                                   1u << RTC_BINDING_HEAP | 1u << RTC_BINDING_CONTROL,
+                                               1);
             RtrTraceOptions options = RTR_TRACE_OPTIONS_DEFAULT;
             options.fetch = static_cast<RtrFetch>(fetch);
             options.workgroupSize = 64;
             rtrDestroyPipeline(rtr, pipeline, nullptr);
-            ASSERT_EQ(make_pipeline(with_reflection(module_trace_spv, sizeof module_trace_spv, h0, ""), 4, &options),
+            ASSERT_EQ(make_pipeline(with_reflection(module_trace_spv, sizeof module_trace_spv, h0, ""), 4,
+                                    &options),
                       VK_SUCCESS);
             if (rtrGetDeviceSupport(rtr)->needsResumableModules) expect_runtime_error("not-resumable");
             Buffer sbt = scene.upload(nullptr, 256);
@@ -220,18 +225,22 @@ TEST_F(TraceTest, ClosestHitsMatchBruteForce) {
 TEST_F(TraceTest, NullStructureMisses) {
     Scene scene(*vk, rtr, 1 << 16);
     Ray ray{{0, 0, 0}, 0, {0, 0, 1}, 1e30f};
-    Buffer rays = scene.upload(&ray, sizeof ray), hits = scene.upload(&ray, sizeof(Hit)), sbt = scene.upload(nullptr, 64);
+    Buffer rays = scene.upload(&ray, sizeof ray), hits = scene.upload(&ray, sizeof(Hit)),
+           sbt = scene.upload(nullptr, 64);
     make_set(3);
     VkDescriptorBufferInfo header;
     ASSERT_EQ(rtrGetNullAccelerationStructureDescriptor(rtr, scene.heap, &header), VK_SUCCESS);
     write(0, header);
     write(1, {rays.handle, 0, VK_WHOLE_SIZE});
     write(2, {hits.handle, 0, VK_WHOLE_SIZE});
-    ASSERT_EQ(make_pipeline(with_reflection(module_trace_spv, sizeof module_trace_spv,
-                                            module_header(1u << RTC_BINDING_PARAMS | 1u << RTC_BINDING_HEAP_TEXELS |
-                                                              1u << RTC_BINDING_HEAP | 1u << RTC_BINDING_CONTROL, 1),
-                                            "", 1), 4),
-              VK_SUCCESS);
+    ASSERT_EQ(
+        make_pipeline(with_reflection(module_trace_spv, sizeof module_trace_spv,
+                                      module_header(1u << RTC_BINDING_PARAMS | 1u << RTC_BINDING_HEAP_TEXELS |
+                                                        1u << RTC_BINDING_HEAP | 1u << RTC_BINDING_CONTROL,
+                                                    1),
+                                      "", 1),
+                      4),
+        VK_SUCCESS);
     if (rtrGetDeviceSupport(rtr)->needsResumableModules) expect_runtime_error("not-resumable");
     uint32_t first = 0;
     scene.run([&] {
@@ -267,16 +276,19 @@ class ResumeTest : public TraceTest {
         h.flags = RTC_MODULE_RESUMABLE;
         h.scratch_words = 1;
         if (c.in_set) h.reserved_set = 0, h.reserved_binding = 20;
-        auto code = c.in_set ? with_reflection(module_resume_in_set_spv, sizeof module_resume_in_set_spv, h, "{}")
-                             : with_reflection(module_resume_spv, sizeof module_resume_spv, h, "{\"a\": 1}");
+        auto code = c.in_set
+                        ? with_reflection(module_resume_in_set_spv, sizeof module_resume_in_set_spv, h, "{}")
+                        : with_reflection(module_resume_spv, sizeof module_resume_spv, h, "{\"a\": 1}");
         std::vector<VkDescriptorSetLayoutBinding> reserved;
         if (c.in_set) {
             uint32_t set_index = 9, count = 0;
-            ASSERT_EQ(rtrGetReservedBindings(rtr, code.data(), code.size() * 4, &set_index, &count, nullptr), VK_SUCCESS);
+            ASSERT_EQ(rtrGetReservedBindings(rtr, code.data(), code.size() * 4, &set_index, &count, nullptr),
+                      VK_SUCCESS);
             EXPECT_EQ(set_index, 0u);
             reserved.resize(count);
-            ASSERT_EQ(rtrGetReservedBindings(rtr, code.data(), code.size() * 4, nullptr, &count, reserved.data()),
-                      VK_SUCCESS);
+            ASSERT_EQ(
+                rtrGetReservedBindings(rtr, code.data(), code.size() * 4, nullptr, &count, reserved.data()),
+                VK_SUCCESS);
         }
         make_set(1, reserved);
         write(0, {result.handle, 0, VK_WHOLE_SIZE});
@@ -320,14 +332,15 @@ class ResumeTest : public TraceTest {
         rtrCmdSetLaunchScratch(rec, scratch.handle, 0, c.scratch);
         rtrCmdSetLaunchLimits(rec, c.tile, c.rounds);
         for (int l = 0; l < c.launches; l++) {
-            RtrStridedBufferRegion rg{sbt.handle, 320 + table.raygen.offset, table.raygen.stride, table.raygen.size};
+            RtrStridedBufferRegion rg{sbt.handle, 320 + table.raygen.offset, table.raygen.stride,
+                                      table.raygen.size};
             RtrStridedBufferRegion hg{sbt.handle, 320 + table.hit.offset, table.hit.stride, table.hit.size};
             if (c.max[0]) {
                 VkTraceRaysIndirectCommandKHR extents{c.w, c.h, c.d};
                 Buffer indirect = scene.upload(nullptr, 512);
                 memcpy(indirect.as<char>(260), &extents, sizeof extents);
-                ASSERT_EQ(rtrCmdTraceRaysIndirect(rec, &rg, nullptr, &hg, nullptr, indirect.handle, 260, c.max[0], c.max[1],
-                                                  c.max[2]),
+                ASSERT_EQ(rtrCmdTraceRaysIndirect(rec, &rg, nullptr, &hg, nullptr, indirect.handle, 260,
+                                                  c.max[0], c.max[1], c.max[2]),
                           c.expected);
                 vk->compute_barrier();
                 continue;
@@ -435,9 +448,11 @@ TEST_F(TraceTest, ModulesAreChecked) {
     auto good = with_reflection(module_resume_spv, sizeof module_resume_spv, h, "json");
     RtcModuleHeader other = h;
     other.abi_version = 77;
-    EXPECT_EQ(create(with_reflection(module_resume_spv, sizeof module_resume_spv, other, "")), VK_ERROR_INCOMPATIBLE_DRIVER);
+    EXPECT_EQ(create(with_reflection(module_resume_spv, sizeof module_resume_spv, other, "")),
+              VK_ERROR_INCOMPATIBLE_DRIVER);
     expect_runtime_error("abi-version");
-    EXPECT_EQ(create({module_resume_spv, module_resume_spv + sizeof module_resume_spv / 4}), VK_ERROR_VALIDATION_FAILED_EXT);
+    EXPECT_EQ(create({module_resume_spv, module_resume_spv + sizeof module_resume_spv / 4}),
+              VK_ERROR_VALIDATION_FAILED_EXT);
     expect_runtime_error("module");
     other = h;
     other.group_count = 1000;
@@ -468,7 +483,8 @@ TEST_F(TraceTest, ModulesAreChecked) {
     EXPECT_EQ(rtrGetRayTracingShaderGroupHandles(rtr, pipeline, 0, 1, 32, handle), VK_SUCCESS);
     EXPECT_EQ(handle[0], 100u);
     EXPECT_EQ(handle[7], 0x1d1d1d1du);
-    EXPECT_EQ(rtrGetRayTracingShaderGroupHandles(rtr, pipeline, 0, 2, 64, handle), VK_ERROR_VALIDATION_FAILED_EXT);
+    EXPECT_EQ(rtrGetRayTracingShaderGroupHandles(rtr, pipeline, 0, 2, 64, handle),
+              VK_ERROR_VALIDATION_FAILED_EXT);
     expect_runtime_error("group-handles");
 }
 

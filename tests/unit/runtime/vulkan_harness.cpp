@@ -6,16 +6,20 @@
 
 namespace {
 
-VKAPI_ATTR VkBool32 VKAPI_CALL on_layer_message(VkDebugUtilsMessageSeverityFlagBitsEXT, VkDebugUtilsMessageTypeFlagsEXT,
-                                                const VkDebugUtilsMessengerCallbackDataEXT* data, void* user) {
+VKAPI_ATTR VkBool32 VKAPI_CALL on_layer_message(VkDebugUtilsMessageSeverityFlagBitsEXT,
+                                                VkDebugUtilsMessageTypeFlagsEXT,
+                                                const VkDebugUtilsMessengerCallbackDataEXT* data,
+                                                void* user) {
     static_cast<Vulkan*>(user)->layer_messages.push_back(data->pMessage);
     return VK_FALSE;
 }
 
 VKAPI_ATTR VkBool32 VKAPI_CALL on_runtime_message(VkDebugUtilsMessageSeverityFlagBitsEXT,
                                                   VkDebugUtilsMessageTypeFlagsEXT,
-                                                  const VkDebugUtilsMessengerCallbackDataEXT* data, void* user) {
-    static_cast<Vulkan*>(user)->runtime_messages.push_back(std::string(data->pMessageIdName) + ": " + data->pMessage);
+                                                  const VkDebugUtilsMessengerCallbackDataEXT* data,
+                                                  void* user) {
+    static_cast<Vulkan*>(user)->runtime_messages.push_back(std::string(data->pMessageIdName) + ": " +
+                                                           data->pMessage);
     return VK_FALSE;
 }
 
@@ -44,8 +48,8 @@ std::unique_ptr<Vulkan> Vulkan::create(std::string& why) {
     v->get_instance_proc_addr =
         reinterpret_cast<PFN_vkGetInstanceProcAddr>(dlsym(v->library_, "vkGetInstanceProcAddr"));
     auto global = [&](const char* name) { return v->get_instance_proc_addr(nullptr, name); };
-    auto enumerate_layers =
-        reinterpret_cast<PFN_vkEnumerateInstanceLayerProperties>(global("vkEnumerateInstanceLayerProperties"));
+    auto enumerate_layers = reinterpret_cast<PFN_vkEnumerateInstanceLayerProperties>(
+        global("vkEnumerateInstanceLayerProperties"));
     uint32_t count = 0;
     enumerate_layers(&count, nullptr);
     std::vector<VkLayerProperties> layers(count);
@@ -151,7 +155,8 @@ Buffer Vulkan::buffer(VkDeviceSize size, VkBufferUsageFlags usage) {
     GetPhysicalDeviceMemoryProperties(physical_device, &memory);
     VkMemoryAllocateInfo allocate{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO};
     allocate.allocationSize = need.size;
-    const VkMemoryPropertyFlags flags = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
+    const VkMemoryPropertyFlags flags =
+        VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
     for (uint32_t i = memory.memoryTypeCount; i-- > 0;) {
         if ((need.memoryTypeBits >> i & 1) && (memory.memoryTypes[i].propertyFlags & flags) == flags)
             allocate.memoryTypeIndex = i;

@@ -13,18 +13,23 @@
 #include "rtc/abi.h"
 #include "rtc/runtime.h"
 
-#define HARNESS_FUNCTIONS(X)                                                                                  \
-    X(EnumeratePhysicalDevices) X(GetPhysicalDeviceProperties) X(GetPhysicalDeviceQueueFamilyProperties)      \
-    X(GetPhysicalDeviceMemoryProperties) X(CreateDevice) X(DestroyDevice) X(GetDeviceQueue) X(CreateBuffer)   \
-    X(DestroyBuffer) X(GetBufferMemoryRequirements) X(AllocateMemory) X(FreeMemory) X(BindBufferMemory)       \
-    X(MapMemory) X(CreateCommandPool) X(DestroyCommandPool) X(AllocateCommandBuffers) X(BeginCommandBuffer)   \
-    X(EndCommandBuffer) X(ResetCommandPool) X(QueueSubmit) X(QueueWaitIdle) X(DeviceWaitIdle)                 \
-    X(CmdPipelineBarrier) X(CmdCopyBuffer) X(CmdFillBuffer) X(CreateDescriptorSetLayout)                      \
-    X(DestroyDescriptorSetLayout) X(CreateDescriptorPool) X(DestroyDescriptorPool) X(AllocateDescriptorSets)  \
-    X(UpdateDescriptorSets) X(CreatePipelineLayout) X(DestroyPipelineLayout) X(CreateShaderModule)            \
-    X(DestroyShaderModule) X(CreateComputePipelines) X(DestroyPipeline) X(CmdBindPipeline)                    \
-    X(CmdBindDescriptorSets) X(CmdDispatch) X(DestroyInstance) X(CmdPushConstants) X(CreateBufferView)        \
-    X(DestroyBufferView) X(CreateDebugUtilsMessengerEXT) X(DestroyDebugUtilsMessengerEXT)
+#define HARNESS_FUNCTIONS(X)                                                                                 \
+    X(EnumeratePhysicalDevices)                                                                              \
+    X(GetPhysicalDeviceProperties) X(GetPhysicalDeviceQueueFamilyProperties)                                 \
+        X(GetPhysicalDeviceMemoryProperties) X(CreateDevice) X(DestroyDevice) X(GetDeviceQueue)              \
+            X(CreateBuffer) X(DestroyBuffer) X(GetBufferMemoryRequirements) X(AllocateMemory) X(FreeMemory)  \
+                X(BindBufferMemory) X(MapMemory) X(CreateCommandPool) X(DestroyCommandPool) X(               \
+                    AllocateCommandBuffers) X(BeginCommandBuffer) X(EndCommandBuffer) X(ResetCommandPool)    \
+                    X(QueueSubmit) X(QueueWaitIdle) X(DeviceWaitIdle) X(CmdPipelineBarrier) X(CmdCopyBuffer) \
+                        X(CmdFillBuffer) X(CreateDescriptorSetLayout) X(DestroyDescriptorSetLayout)          \
+                            X(CreateDescriptorPool) X(DestroyDescriptorPool) X(AllocateDescriptorSets)       \
+                                X(UpdateDescriptorSets) X(CreatePipelineLayout) X(DestroyPipelineLayout)     \
+                                    X(CreateShaderModule) X(DestroyShaderModule) X(CreateComputePipelines)   \
+                                        X(DestroyPipeline) X(CmdBindPipeline) X(CmdBindDescriptorSets)       \
+                                            X(CmdDispatch) X(DestroyInstance) X(CmdPushConstants)            \
+                                                X(CreateBufferView) X(DestroyBufferView)                     \
+                                                    X(CreateDebugUtilsMessengerEXT)                          \
+                                                        X(DestroyDebugUtilsMessengerEXT)
 
 struct Buffer {
     VkBuffer handle = VK_NULL_HANDLE;
@@ -62,7 +67,8 @@ class Vulkan {
     void destroy(Buffer& buffer);
     void begin();
     void submit();  // ends, submits, waits
-    void barrier(VkPipelineStageFlags src, VkAccessFlags src_access, VkPipelineStageFlags dst, VkAccessFlags dst_access);
+    void barrier(VkPipelineStageFlags src, VkAccessFlags src_access, VkPipelineStageFlags dst,
+                 VkAccessFlags dst_access);
     void compute_barrier();
     void host_barrier();
     VkDebugUtilsMessengerCreateInfoEXT messenger_info(bool runtime);
