@@ -14,9 +14,11 @@ World world_of(const tools::Scene& scene) {
         bottom.name = mesh.name;
         Geometry geometry;
         geometry.boxes = mesh.procedural();
-        geometry.flags = (mesh.opaque ? uint32_t(VK_GEOMETRY_OPAQUE_BIT_KHR) : 0u) |
-                         (mesh.no_duplicate_any_hit ? uint32_t(VK_GEOMETRY_NO_DUPLICATE_ANY_HIT_INVOCATION_BIT_KHR) : 0u);
-        for (const glm::vec3& p : mesh.positions) geometry.positions.insert(geometry.positions.end(), {p.x, p.y, p.z});
+        geometry.flags =
+            (mesh.opaque ? uint32_t(VK_GEOMETRY_OPAQUE_BIT_KHR) : 0u) |
+            (mesh.no_duplicate_any_hit ? uint32_t(VK_GEOMETRY_NO_DUPLICATE_ANY_HIT_INVOCATION_BIT_KHR) : 0u);
+        for (const glm::vec3& p : mesh.positions)
+            geometry.positions.insert(geometry.positions.end(), {p.x, p.y, p.z});
         geometry.indices = mesh.indices;
         for (const auto& box : mesh.boxes)
             geometry.bounds.insert(geometry.bounds.end(),
@@ -56,15 +58,16 @@ TableLayout lay_out(const Tables& tables, const std::vector<uint8_t>& handles, c
         size_t data = 0;
         for (const auto& record : table.records) data = std::max(data, record.data.size());
         // A raygen region is one record: its stride is its size, and each starts at a base.
-        uint32_t smallest =
-            uint32_t(align(limits.handle_bytes + data, raygen ? limits.base_alignment : limits.handle_alignment));
+        uint32_t smallest = uint32_t(
+            align(limits.handle_bytes + data, raygen ? limits.base_alignment : limits.handle_alignment));
         region.stride = std::max(table.stride, smallest);
         if (table.stride && table.stride < smallest)
             throw Error(std::string(what) + " records need a stride of " + std::to_string(smallest) + ", " +
                         std::to_string(table.stride) + " was given");
         if (region.stride % limits.handle_alignment)
             throw Error(std::string(what) + " stride " + std::to_string(region.stride) +
-                        " is not a multiple of the handle alignment " + std::to_string(limits.handle_alignment));
+                        " is not a multiple of the handle alignment " +
+                        std::to_string(limits.handle_alignment));
         region.offset = align(layout.bytes.size(), limits.base_alignment);
         region.size = VkDeviceSize(region.stride) * table.records.size();
         layout.bytes.resize(region.offset + region.size);
@@ -77,7 +80,8 @@ TableLayout lay_out(const Tables& tables, const std::vector<uint8_t>& handles, c
                                 std::to_string(record.group) + "; there are " + std::to_string(groups));
                 std::memcpy(at, &handles[record.group * limits.handle_bytes], limits.handle_bytes);
             }
-            if (!record.data.empty()) std::memcpy(at + limits.handle_bytes, record.data.data(), record.data.size());
+            if (!record.data.empty())
+                std::memcpy(at + limits.handle_bytes, record.data.data(), record.data.size());
         }
         return region;
     };
@@ -86,8 +90,8 @@ TableLayout lay_out(const Tables& tables, const std::vector<uint8_t>& handles, c
     layout.hit = place(tables.hit, "hit", false);
     layout.callable = place(tables.callable, "callable", false);
     if (tables.raygen_index >= tables.raygen.records.size())
-        throw Error("the launch starts raygen record " + std::to_string(tables.raygen_index) + "; there are " +
-                    std::to_string(tables.raygen.records.size()));
+        throw Error("the launch starts raygen record " + std::to_string(tables.raygen_index) +
+                    "; there are " + std::to_string(tables.raygen.records.size()));
     layout.raygen.offset += VkDeviceSize(tables.raygen_index) * layout.raygen.stride;
     layout.raygen.size = layout.raygen.stride;
     return layout;
@@ -117,12 +121,18 @@ void Requirements::apply(tools::ContextOptions& options) {
 namespace {
 VkShaderStageFlagBits stage_bit(tools::JobStage stage) {
     switch (stage) {
-        case tools::JobStage::RayGen: return VK_SHADER_STAGE_RAYGEN_BIT_KHR;
-        case tools::JobStage::Intersection: return VK_SHADER_STAGE_INTERSECTION_BIT_KHR;
-        case tools::JobStage::AnyHit: return VK_SHADER_STAGE_ANY_HIT_BIT_KHR;
-        case tools::JobStage::ClosestHit: return VK_SHADER_STAGE_CLOSEST_HIT_BIT_KHR;
-        case tools::JobStage::Miss: return VK_SHADER_STAGE_MISS_BIT_KHR;
-        case tools::JobStage::Callable: return VK_SHADER_STAGE_CALLABLE_BIT_KHR;
+        case tools::JobStage::RayGen:
+            return VK_SHADER_STAGE_RAYGEN_BIT_KHR;
+        case tools::JobStage::Intersection:
+            return VK_SHADER_STAGE_INTERSECTION_BIT_KHR;
+        case tools::JobStage::AnyHit:
+            return VK_SHADER_STAGE_ANY_HIT_BIT_KHR;
+        case tools::JobStage::ClosestHit:
+            return VK_SHADER_STAGE_CLOSEST_HIT_BIT_KHR;
+        case tools::JobStage::Miss:
+            return VK_SHADER_STAGE_MISS_BIT_KHR;
+        case tools::JobStage::Callable:
+            return VK_SHADER_STAGE_CALLABLE_BIT_KHR;
     }
     return VK_SHADER_STAGE_RAYGEN_BIT_KHR;
 }
@@ -160,7 +170,8 @@ StageList::~StageList() {
     for (VkShaderModule module : modules_) vkDestroyShaderModule(device_, module, nullptr);
 }
 
-VkBuffer NvGeometries::input(const Context& context, const void* data, size_t bytes, VkBufferUsageFlags usage) {
+VkBuffer NvGeometries::input(const Context& context, const void* data, size_t bytes,
+                             VkBufferUsageFlags usage) {
     Buffer buffer(context, bytes, usage, tools::MemoryKind::Host);
     if (bytes) std::memcpy(buffer.mapped, data, bytes);
     buffers_.push_back(std::move(buffer));
@@ -180,7 +191,9 @@ NvGeometries::NvGeometries(const Context& context, const Bottom& bottom, VkBuffe
         auto& aabbs = out.geometry.aabbs;
         aabbs = {VK_STRUCTURE_TYPE_GEOMETRY_AABB_NV};
         aabbs.stride = 24;
-        auto upload = [&](const auto& data) { return input(context, data.data(), data.size() * sizeof(data[0]), usage); };
+        auto upload = [&](const auto& data) {
+            return input(context, data.data(), data.size() * sizeof(data[0]), usage);
+        };
         if (geometry.boxes) {
             aabbs.aabbData = upload(geometry.bounds);
             aabbs.numAABBs = geometry.primitive_count();

@@ -31,7 +31,8 @@ struct Geometry {
     uint32_t flags = 0;             // VkGeometryFlagsKHR
     std::vector<float> transform;   // 12 floats, row-major 3x4, or none
     uint32_t primitive_count() const {
-        return uint32_t(boxes ? bounds.size() / 6 : (indices.empty() ? positions.size() / 9 : indices.size() / 3));
+        return uint32_t(boxes ? bounds.size() / 6
+                              : (indices.empty() ? positions.size() / 9 : indices.size() / 3));
     }
 };
 
@@ -108,7 +109,8 @@ class Executor {
     virtual void build(const World& world) = 0;
     // `set_layouts` are the application's, one for each set from 0 up.
     virtual void create_pipeline(const tools::JobPipeline& pipeline,
-                                 const std::vector<VkDescriptorSetLayout>& set_layouts, uint32_t push_bytes) = 0;
+                                 const std::vector<VkDescriptorSetLayout>& set_layouts,
+                                 uint32_t push_bytes) = 0;
     virtual void set_tables(const Tables& tables) = 0;
     // `top` indexes World::tops; ~0u writes a null acceleration structure where the executor can.
     virtual void write_top(VkDescriptorSet set, uint32_t binding, uint32_t element, uint32_t top) = 0;

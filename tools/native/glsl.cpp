@@ -22,12 +22,18 @@ using tools::JobStage;
 
 EShLanguage language(JobStage stage) {
     switch (stage) {
-        case JobStage::RayGen: return EShLangRayGen;
-        case JobStage::Intersection: return EShLangIntersect;
-        case JobStage::AnyHit: return EShLangAnyHit;
-        case JobStage::ClosestHit: return EShLangClosestHit;
-        case JobStage::Miss: return EShLangMiss;
-        case JobStage::Callable: return EShLangCallable;
+        case JobStage::RayGen:
+            return EShLangRayGen;
+        case JobStage::Intersection:
+            return EShLangIntersect;
+        case JobStage::AnyHit:
+            return EShLangAnyHit;
+        case JobStage::ClosestHit:
+            return EShLangClosestHit;
+        case JobStage::Miss:
+            return EShLangMiss;
+        case JobStage::Callable:
+            return EShLangCallable;
     }
     return EShLangRayGen;
 }
@@ -79,8 +85,9 @@ std::string to_ext(const std::string& glsl) {
         {std::regex(R"(\bGL_NV_ray_tracing\b)"), "GL_EXT_ray_tracing"},
         {std::regex(R"(\btraceNV\b)"), "traceRayEXT"},
         {std::regex(R"(\b(ignoreIntersection|terminateRay)NV\s*\(\s*\))"), "$1EXT"},
-        {std::regex(R"(\b(gl_\w+?|rayPayload|rayPayloadIn|hitAttribute|callableData|callableDataIn|shaderRecord|)"
-                    R"(accelerationStructure|reportIntersection|executeCallable)NV\b)"),
+        {std::regex(
+             R"(\b(gl_\w+?|rayPayload|rayPayloadIn|hitAttribute|callableData|callableDataIn|shaderRecord|)"
+             R"(accelerationStructure|reportIntersection|executeCallable)NV\b)"),
          "$1EXT"},
     };
     std::string text = glsl;
@@ -101,13 +108,16 @@ std::vector<uint32_t> compile_glsl(const GlslSource& source) {
     std::string preamble;
     for (const std::string& define : source.defines) {
         size_t equals = define.find('=');
-        preamble += "#define " + (equals == std::string::npos
-                                      ? define
-                                      : define.substr(0, equals) + " " + define.substr(equals + 1)) + "\n";
+        preamble +=
+            "#define " +
+            (equals == std::string::npos ? define
+                                         : define.substr(0, equals) + " " + define.substr(equals + 1)) +
+            "\n";
     }
     shader.setPreamble(preamble.c_str());
     shader.setEnvInput(glslang::EShSourceGlsl, stage, glslang::EShClientVulkan, 100);
-    shader.setEnvClient(glslang::EShClientVulkan, nv ? glslang::EShTargetVulkan_1_1 : glslang::EShTargetVulkan_1_2);
+    shader.setEnvClient(glslang::EShClientVulkan,
+                        nv ? glslang::EShTargetVulkan_1_1 : glslang::EShTargetVulkan_1_2);
     shader.setEnvTarget(glslang::EShTargetSpv, nv ? glslang::EShTargetSpv_1_3 : glslang::EShTargetSpv_1_4);
     auto messages = EShMessages(EShMsgSpvRules | EShMsgVulkanRules);
     Includer includer(source.file, source.include_dirs);
@@ -133,8 +143,8 @@ const char* stage_suffix(JobStage stage) {
 }
 
 bool stage_of_suffix(const std::string& suffix, JobStage& stage) {
-    for (JobStage s : {JobStage::RayGen, JobStage::Intersection, JobStage::AnyHit, JobStage::ClosestHit, JobStage::Miss,
-                       JobStage::Callable})
+    for (JobStage s : {JobStage::RayGen, JobStage::Intersection, JobStage::AnyHit, JobStage::ClosestHit,
+                       JobStage::Miss, JobStage::Callable})
         if (suffix == stage_suffix(s)) {
             stage = s;
             return true;

@@ -68,7 +68,8 @@ class KhrExecutor final : public Executor {
         for (const Top& top : world.tops) tops_.push_back(build_top(top));
     }
 
-    void create_pipeline(const tools::JobPipeline& pipeline, const std::vector<VkDescriptorSetLayout>& set_layouts,
+    void create_pipeline(const tools::JobPipeline& pipeline,
+                         const std::vector<VkDescriptorSetLayout>& set_layouts,
                          uint32_t push_bytes) override {
         VkPushConstantRange range{stages(), 0, push_bytes};
         VkPipelineLayoutCreateInfo layout{VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO};
@@ -80,8 +81,9 @@ class KhrExecutor final : public Executor {
         StageList stages(context_.device, pipeline);
         std::vector<VkRayTracingShaderGroupCreateInfoKHR> groups;
         for (const tools::JobGroup& group : pipeline.groups) {
-            VkRayTracingShaderGroupCreateInfoKHR info{VK_STRUCTURE_TYPE_RAY_TRACING_SHADER_GROUP_CREATE_INFO_KHR};
-            info.type = group.general >= 0     ? VK_RAY_TRACING_SHADER_GROUP_TYPE_GENERAL_KHR
+            VkRayTracingShaderGroupCreateInfoKHR info{
+                VK_STRUCTURE_TYPE_RAY_TRACING_SHADER_GROUP_CREATE_INFO_KHR};
+            info.type = group.general >= 0   ? VK_RAY_TRACING_SHADER_GROUP_TYPE_GENERAL_KHR
                         : group.procedural() ? VK_RAY_TRACING_SHADER_GROUP_TYPE_PROCEDURAL_HIT_GROUP_KHR
                                              : VK_RAY_TRACING_SHADER_GROUP_TYPE_TRIANGLES_HIT_GROUP_KHR;
             info.generalShader = uint32_t(group.general);  // -1 is VK_SHADER_UNUSED_KHR
@@ -96,9 +98,11 @@ class KhrExecutor final : public Executor {
         info.pStages = stages.infos().data();
         info.groupCount = group_count_;
         info.pGroups = groups.data();
-        info.maxPipelineRayRecursionDepth = std::min(pipeline.max_recursion, properties_.maxRayRecursionDepth);
+        info.maxPipelineRayRecursionDepth =
+            std::min(pipeline.max_recursion, properties_.maxRayRecursionDepth);
         info.layout = layout_;
-        check(f_.create_pipelines(context_.device, VK_NULL_HANDLE, VK_NULL_HANDLE, 1, &info, nullptr, &pipeline_),
+        check(f_.create_pipelines(context_.device, VK_NULL_HANDLE, VK_NULL_HANDLE, 1, &info, nullptr,
+                                  &pipeline_),
               "vkCreateRayTracingPipelinesKHR");
     }
 
@@ -113,8 +117,8 @@ class KhrExecutor final : public Executor {
                                VK_BUFFER_USAGE_SHADER_BINDING_TABLE_BIT_KHR | kAddress, MemoryKind::Host);
         VkDeviceAddress base = table_buffer_.address;
         table_address_ = (base + limits.base_alignment - 1) / limits.base_alignment * limits.base_alignment;
-        std::memcpy(static_cast<uint8_t*>(table_buffer_.mapped) + (table_address_ - base), table_.bytes.data(),
-                    table_.bytes.size());
+        std::memcpy(static_cast<uint8_t*>(table_buffer_.mapped) + (table_address_ - base),
+                    table_.bytes.data(), table_.bytes.size());
     }
 
     void write_top(VkDescriptorSet set, uint32_t binding, uint32_t element, uint32_t top) override {
@@ -160,19 +164,22 @@ class KhrExecutor final : public Executor {
 
     Built build_one(VkAccelerationStructureBuildGeometryInfoKHR& info, const std::vector<uint32_t>& counts,
                     const std::vector<VkAccelerationStructureBuildRangeInfoKHR>& ranges) {
-        VkAccelerationStructureBuildSizesInfoKHR sizes{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_BUILD_SIZES_INFO_KHR};
-        f_.build_sizes(context_.device, VK_ACCELERATION_STRUCTURE_BUILD_TYPE_DEVICE_KHR, &info, counts.data(), &sizes);
+        VkAccelerationStructureBuildSizesInfoKHR sizes{
+            VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_BUILD_SIZES_INFO_KHR};
+        f_.build_sizes(context_.device, VK_ACCELERATION_STRUCTURE_BUILD_TYPE_DEVICE_KHR, &info, counts.data(),
+                       &sizes);
         Built built;
-        built.memory = Buffer(context_, sizes.accelerationStructureSize,
-                              VK_BUFFER_USAGE_ACCELERATION_STRUCTURE_STORAGE_BIT_KHR | kAddress, MemoryKind::Device);
+        built.memory =
+            Buffer(context_, sizes.accelerationStructureSize,
+                   VK_BUFFER_USAGE_ACCELERATION_STRUCTURE_STORAGE_BIT_KHR | kAddress, MemoryKind::Device);
         VkAccelerationStructureCreateInfoKHR create{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_CREATE_INFO_KHR};
         create.buffer = built.memory.handle;
         create.size = sizes.accelerationStructureSize;
         create.type = info.type;
         check(f_.create_as(context_.device, &create, nullptr, &built.as), "vkCreateAccelerationStructureKHR");
         VkDeviceSize alignment = std::max(1u, as_properties_.minAccelerationStructureScratchOffsetAlignment);
-        Buffer scratch(context_, sizes.buildScratchSize + alignment, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | kAddress,
-                       MemoryKind::Device);
+        Buffer scratch(context_, sizes.buildScratchSize + alignment,
+                       VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | kAddress, MemoryKind::Device);
         info.dstAccelerationStructure = built.as;
         info.scratchData.deviceAddress = (scratch.address + alignment - 1) / alignment * alignment;
         const VkAccelerationStructureBuildRangeInfoKHR* range = ranges.data();
@@ -221,8 +228,10 @@ class KhrExecutor final : public Executor {
                 triangles.vertexStride = 12;
                 uint32_t vertices = uint32_t(geometry.positions.size() / 3);
                 triangles.maxVertex = vertices ? vertices - 1 : 0;
-                triangles.indexType = geometry.indices.empty() ? VK_INDEX_TYPE_NONE_KHR : VK_INDEX_TYPE_UINT32;
-                if (!geometry.indices.empty()) triangles.indexData.deviceAddress = keep(input(geometry.indices));
+                triangles.indexType =
+                    geometry.indices.empty() ? VK_INDEX_TYPE_NONE_KHR : VK_INDEX_TYPE_UINT32;
+                if (!geometry.indices.empty())
+                    triangles.indexData.deviceAddress = keep(input(geometry.indices));
                 if (!geometry.transform.empty())
                     triangles.transformData.deviceAddress = keep(input(geometry.transform));
             }
@@ -242,8 +251,8 @@ class KhrExecutor final : public Executor {
     Built build_top(const Top& top) {
         std::vector<VkAccelerationStructureInstanceKHR> instances;
         for (const Placement& placement : top.instances)
-            instances.push_back(
-                instance_of(placement, placement.bottom < 0 ? 0 : bottoms_.at(size_t(placement.bottom)).address));
+            instances.push_back(instance_of(
+                placement, placement.bottom < 0 ? 0 : bottoms_.at(size_t(placement.bottom)).address));
         Buffer buffer = input(instances);
         VkAccelerationStructureGeometryKHR geometry{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_GEOMETRY_KHR};
         geometry.geometryType = VK_GEOMETRY_TYPE_INSTANCES_KHR;

@@ -53,8 +53,9 @@ class NvExecutor final : public Executor {
 
     const char* name() const override { return "native NV"; }
     VkShaderStageFlags stages() const override {
-        return VK_SHADER_STAGE_RAYGEN_BIT_NV | VK_SHADER_STAGE_ANY_HIT_BIT_NV | VK_SHADER_STAGE_CLOSEST_HIT_BIT_NV |
-               VK_SHADER_STAGE_MISS_BIT_NV | VK_SHADER_STAGE_INTERSECTION_BIT_NV | VK_SHADER_STAGE_CALLABLE_BIT_NV;
+        return VK_SHADER_STAGE_RAYGEN_BIT_NV | VK_SHADER_STAGE_ANY_HIT_BIT_NV |
+               VK_SHADER_STAGE_CLOSEST_HIT_BIT_NV | VK_SHADER_STAGE_MISS_BIT_NV |
+               VK_SHADER_STAGE_INTERSECTION_BIT_NV | VK_SHADER_STAGE_CALLABLE_BIT_NV;
     }
     VkDescriptorType top_descriptor() const override { return VK_DESCRIPTOR_TYPE_ACCELERATION_STRUCTURE_NV; }
 
@@ -63,7 +64,8 @@ class NvExecutor final : public Executor {
         for (const Top& top : world.tops) tops_.push_back(build_top(top));
     }
 
-    void create_pipeline(const tools::JobPipeline& pipeline, const std::vector<VkDescriptorSetLayout>& set_layouts,
+    void create_pipeline(const tools::JobPipeline& pipeline,
+                         const std::vector<VkDescriptorSetLayout>& set_layouts,
                          uint32_t push_bytes) override {
         VkPushConstantRange range{stages(), 0, push_bytes};
         VkPipelineLayoutCreateInfo layout{VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO};
@@ -75,8 +77,9 @@ class NvExecutor final : public Executor {
         StageList stages(context_.device, pipeline);
         std::vector<VkRayTracingShaderGroupCreateInfoNV> groups;
         for (const tools::JobGroup& group : pipeline.groups) {
-            VkRayTracingShaderGroupCreateInfoNV info{VK_STRUCTURE_TYPE_RAY_TRACING_SHADER_GROUP_CREATE_INFO_NV};
-            info.type = group.general >= 0     ? VK_RAY_TRACING_SHADER_GROUP_TYPE_GENERAL_NV
+            VkRayTracingShaderGroupCreateInfoNV info{
+                VK_STRUCTURE_TYPE_RAY_TRACING_SHADER_GROUP_CREATE_INFO_NV};
+            info.type = group.general >= 0   ? VK_RAY_TRACING_SHADER_GROUP_TYPE_GENERAL_NV
                         : group.procedural() ? VK_RAY_TRACING_SHADER_GROUP_TYPE_PROCEDURAL_HIT_GROUP_NV
                                              : VK_RAY_TRACING_SHADER_GROUP_TYPE_TRIANGLES_HIT_GROUP_NV;
             info.generalShader = uint32_t(group.general);  // -1 is VK_SHADER_UNUSED_NV
@@ -131,11 +134,13 @@ class NvExecutor final : public Executor {
         if (!launch.push_constants.empty())
             vkCmdPushConstants(commands, layout_, stages(), 0, uint32_t(launch.push_constants.size()),
                                launch.push_constants.data());
-        auto buffer = [&](const TableLayout::Region& r) { return r.size ? table_buffer_.handle : VK_NULL_HANDLE; };
-        f_.cmd_trace(commands, table_buffer_.handle, table_.raygen.offset, buffer(table_.miss), table_.miss.offset,
-                     table_.miss.stride, buffer(table_.hit), table_.hit.offset, table_.hit.stride,
-                     buffer(table_.callable), table_.callable.offset, table_.callable.stride, launch.width,
-                     launch.height, launch.depth);
+        auto buffer = [&](const TableLayout::Region& r) {
+            return r.size ? table_buffer_.handle : VK_NULL_HANDLE;
+        };
+        f_.cmd_trace(commands, table_buffer_.handle, table_.raygen.offset, buffer(table_.miss),
+                     table_.miss.offset, table_.miss.stride, buffer(table_.hit), table_.hit.offset,
+                     table_.hit.stride, buffer(table_.callable), table_.callable.offset,
+                     table_.callable.stride, launch.width, launch.height, launch.depth);
     }
 
   private:
@@ -175,7 +180,8 @@ class NvExecutor final : public Executor {
         allocate.allocationSize = object.size;
         allocate.memoryTypeIndex = type;
         check(vkAllocateMemory(device, &allocate, nullptr, &built.memory), "vkAllocateMemory");
-        VkBindAccelerationStructureMemoryInfoNV bind{VK_STRUCTURE_TYPE_BIND_ACCELERATION_STRUCTURE_MEMORY_INFO_NV};
+        VkBindAccelerationStructureMemoryInfoNV bind{
+            VK_STRUCTURE_TYPE_BIND_ACCELERATION_STRUCTURE_MEMORY_INFO_NV};
         bind.accelerationStructure = built.as;
         bind.memory = built.memory;
         check(f_.bind_memory(device, 1, &bind), "vkBindAccelerationStructureMemoryNV");
@@ -184,7 +190,8 @@ class NvExecutor final : public Executor {
             requirements(built.as, VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_BUILD_SCRATCH_NV).size,
             VK_BUFFER_USAGE_RAY_TRACING_BIT_NV, MemoryKind::Device);
         context_.run([&](VkCommandBuffer commands) {
-            f_.cmd_build(commands, &info, instances, 0, VK_FALSE, built.as, VK_NULL_HANDLE, scratch.handle, 0);
+            f_.cmd_build(commands, &info, instances, 0, VK_FALSE, built.as, VK_NULL_HANDLE, scratch.handle,
+                         0);
             tools::full_barrier(commands);
         });
         check(f_.as_handle(device, built.as, sizeof(built.handle), &built.handle),
@@ -194,7 +201,8 @@ class NvExecutor final : public Executor {
 
     template <typename T>
     Buffer input(const std::vector<T>& data) {
-        Buffer buffer(context_, data.size() * sizeof(T), VK_BUFFER_USAGE_RAY_TRACING_BIT_NV, MemoryKind::Host);
+        Buffer buffer(context_, data.size() * sizeof(T), VK_BUFFER_USAGE_RAY_TRACING_BIT_NV,
+                      MemoryKind::Host);
         if (!data.empty()) std::memcpy(buffer.mapped, data.data(), data.size() * sizeof(T));
         return buffer;
     }
@@ -212,8 +220,8 @@ class NvExecutor final : public Executor {
     Built build_top(const Top& top) {
         std::vector<VkAccelerationStructureInstanceKHR> instances;
         for (const Placement& placement : top.instances)
-            instances.push_back(
-                instance_of(placement, placement.bottom < 0 ? 0 : bottoms_.at(size_t(placement.bottom)).handle));
+            instances.push_back(instance_of(
+                placement, placement.bottom < 0 ? 0 : bottoms_.at(size_t(placement.bottom)).handle));
         Buffer buffer = input(instances);
         VkAccelerationStructureInfoNV info{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV};
         info.type = VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV;

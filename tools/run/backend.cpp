@@ -25,9 +25,15 @@ Host::Host(std::set<Backend> backends, const Options& options) {
 RunResult Host::run(Backend backend, const Job& job, const RtcOptions& options, unsigned repeats) {
     std::unique_ptr<native::Executor> executor;
     switch (backend) {
-        case Backend::Rtc: executor = make_rtc(*rtc_, options); break;
-        case Backend::Khr: executor = native::make_khr(*context_); break;
-        case Backend::Nv: executor = native::make_nv(*context_); break;
+        case Backend::Rtc:
+            executor = make_rtc(*rtc_, options);
+            break;
+        case Backend::Khr:
+            executor = native::make_khr(*context_);
+            break;
+        case Backend::Nv:
+            executor = native::make_nv(*context_);
+            break;
     }
     RunResult result = run_job(*context_, *executor, job, repeats);
     return result;

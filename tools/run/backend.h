@@ -44,8 +44,8 @@ struct SuiteOptions {
     Host::Options host;
     RtcOptions rtc;
     bool list = false, verbose = false, compare = false;  // compare: with native KHR, whole outputs
-    unsigned timeout_seconds = 120;  // for one case
-    std::string save_oracle, oracle;  // folders of outputs of the native run
+    unsigned timeout_seconds = 120;                       // for one case
+    std::string save_oracle, oracle;                      // folders of outputs of the native run
 };
 // Exit status: 0 all passed.
 int run_suite(const SuiteOptions& options);

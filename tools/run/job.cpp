@@ -31,7 +31,8 @@ StageSource stage_from_file(const std::string& path) {
     else {
         source.text = native::read_text(path);
         if (!known)
-            throw Error("cannot tell the stage of '" + path + "'; its name must end in .rgen .rint .rahit .rchit .rmiss "
+            throw Error("cannot tell the stage of '" + path +
+                        "'; its name must end in .rgen .rint .rahit .rchit .rmiss "
                         "or .rcall (with .glsl behind if you like), or it must be .spv");
     }
     return source;
@@ -53,9 +54,10 @@ std::string join_lines(const Json& json) {  // a text, or a list of lines
 }  // namespace
 
 Job parse_case(const Json& json, const std::string& file) {
-    static const std::set<std::string> known = {"name",  "section", "stages",   "groups", "table",  "scene",
-                                                "size",  "push",    "bindings", "expect", "spec",   "recursion",
-                                                "only",  "skip",    "callable-depth", "launch-error", "include", "about"};
+    static const std::set<std::string> known = {
+        "name", "section", "stages",         "groups",       "table",   "scene",
+        "size", "push",    "bindings",       "expect",       "spec",    "recursion",
+        "only", "skip",    "callable-depth", "launch-error", "include", "about"};
     if (!json.is_object()) throw Error(file + ": a case is a JSON object");
     for (const auto& [key, value] : json.items())
         if (!known.count(key)) throw Error(file + ": unknown key '" + key + "' in a case");
@@ -70,12 +72,15 @@ Job parse_case(const Json& json, const std::string& file) {
             source = stage_from_file((std::filesystem::path(folder) / stage.get<std::string>()).string());
         } else {
             if (stage.contains("file"))
-                source = stage_from_file((std::filesystem::path(folder) / stage["file"].get<std::string>()).string());
+                source = stage_from_file(
+                    (std::filesystem::path(folder) / stage["file"].get<std::string>()).string());
             if (stage.contains("source")) source.text = join_lines(stage["source"]);
             if (stage.contains("stage") &&
                 !native::stage_of_suffix(stage["stage"].get<std::string>(), source.stage))
-                throw Error("stage " + stage["stage"].dump() + " is none of rgen rint rahit rchit rmiss rcall");
-            source.name = text_or(stage, "name", source.name.empty() ? text_or(stage, "stage", "") : source.name);
+                throw Error("stage " + stage["stage"].dump() +
+                            " is none of rgen rint rahit rchit rmiss rcall");
+            source.name =
+                text_or(stage, "name", source.name.empty() ? text_or(stage, "stage", "") : source.name);
             if (source.file.empty())
                 source.file = job.name + "/" + source.name + "." + native::stage_suffix(source.stage);
             source.entry = text_or(stage, "entry", "");
@@ -140,7 +145,8 @@ namespace {
 int stage_index(const Job& job, const Json& name, const char* what) {
     if (name.is_null()) return -1;
     if (name.is_number()) {
-        if (name.get<size_t>() >= job.sources.size()) throw Error(std::string(what) + ": there is no stage " + name.dump());
+        if (name.get<size_t>() >= job.sources.size())
+            throw Error(std::string(what) + ": there is no stage " + name.dump());
         return name.get<int>();
     }
     for (size_t i = 0; i < job.sources.size(); ++i)
@@ -164,7 +170,8 @@ void make_groups(Job& job) {
             group.name = text_or(json, "name",
                                  group.general >= 0 ? job.sources[size_t(group.general)].name
                                                     : "group" + std::to_string(groups.size()));
-            for (int s : {group.general, group.closest_hit, group.any_hit, group.intersection}) in_group.insert(s);
+            for (int s : {group.general, group.closest_hit, group.any_hit, group.intersection})
+                in_group.insert(s);
             groups.push_back(group);
         }
     // Stages that no group names: general ones and closest-hits are groups of their own; an any-hit or an
@@ -183,14 +190,21 @@ void make_groups(Job& job) {
                 groups.push_back(group);
                 break;
             }
-            case JobStage::ClosestHit: ++closest; break;
-            case JobStage::AnyHit: loose.any_hit = int(i); break;
-            case JobStage::Intersection: loose.intersection = int(i); break;
+            case JobStage::ClosestHit:
+                ++closest;
+                break;
+            case JobStage::AnyHit:
+                loose.any_hit = int(i);
+                break;
+            case JobStage::Intersection:
+                loose.intersection = int(i);
+                break;
         }
     }
     if (closest > 1 && (loose.any_hit >= 0 || loose.intersection >= 0))
-        throw Error("several closest-hit stages and a free any-hit or intersection stage: say who belongs together "
-                    "with --hit-group");
+        throw Error(
+            "several closest-hit stages and a free any-hit or intersection stage: say who belongs together "
+            "with --hit-group");
     bool made = false;
     for (size_t i = 0; i < job.sources.size(); ++i)
         if (!in_group.count(int(i)) && job.sources[i].stage == JobStage::ClosestHit) {
@@ -280,9 +294,15 @@ native::Tables make_tables(const Job& job, const AddressOf& address) {
         record.group = uint32_t(i);
         native::Table* table = &tables.hit;
         if (groups[i].general >= 0) switch (job.sources[size_t(groups[i].general)].stage) {
-                case JobStage::RayGen: table = &tables.raygen; break;
-                case JobStage::Miss: table = &tables.miss; break;
-                default: table = &tables.callable; break;
+                case JobStage::RayGen:
+                    table = &tables.raygen;
+                    break;
+                case JobStage::Miss:
+                    table = &tables.miss;
+                    break;
+                default:
+                    table = &tables.callable;
+                    break;
             }
         table->records.push_back(record);
     }
@@ -303,8 +323,10 @@ native::Tables make_tables(const Job& job, const AddressOf& address) {
                         const JobGroup& group = groups[record.group];
                         TypeRef block;
                         for (int s : {group.general, group.closest_hit, group.any_hit, group.intersection})
-                            if (s >= 0 && job.modules[size_t(s)].record) block = job.modules[size_t(s)].record;
-                        if (!block) throw Error("no stage of group " + group.name + " declares a shader record");
+                            if (s >= 0 && job.modules[size_t(s)].record)
+                                block = job.modules[size_t(s)].record;
+                        if (!block)
+                            throw Error("no stage of group " + group.name + " declares a shader record");
                         record.data.resize(block->size());
                         write_typed(*block, data, record.data, 0, address);
                     }

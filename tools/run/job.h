@@ -25,22 +25,22 @@ std::string slot_name(Slot slot);
 struct StageSource {
     std::string name;
     tools::JobStage stage = tools::JobStage::RayGen;
-    std::string file;                // for messages; read when `text` and `words` are empty
-    std::string text;                // GLSL
-    std::vector<uint32_t> words;     // SPIR-V
-    std::string entry;               // SPIR-V: empty takes the first
+    std::string file;             // for messages; read when `text` and `words` are empty
+    std::string text;             // GLSL
+    std::vector<uint32_t> words;  // SPIR-V
+    std::string entry;            // SPIR-V: empty takes the first
     std::vector<std::string> defines;
     std::map<std::string, Json> constants;  // by id or by name
 };
 
 struct Expectation {
-    std::string cell;      // what it shows
+    std::string cell;  // what it shows
     Slot slot;
-    std::string type;      // "u32", "i32", "f32", "u64", "f64"
-    size_t at = 0;         // index of the first value, in units of the type
-    Json values;           // a list; null: taken from the native run
+    std::string type;  // "u32", "i32", "f32", "u64", "f64"
+    size_t at = 0;     // index of the first value, in units of the type
+    Json values;       // a list; null: taken from the native run
     double absolute = 0, relative = 0;
-    std::string native;    // why native drivers are known to differ; "" if they must not
+    std::string native;  // why native drivers are known to differ; "" if they must not
 };
 
 struct Job {
@@ -54,8 +54,8 @@ struct Job {
     bool sized = false;
     uint32_t recursion = 0, callable_depth = 0;  // 0: from the shaders
     std::vector<Expectation> expectations;
-    std::string launch_error;  // expected on rtc, "" for none
-    std::set<std::string> only;  // dialects or backends a case is limited to; empty: all
+    std::string launch_error;                 // expected on rtc, "" for none
+    std::set<std::string> only;               // dialects or backends a case is limited to; empty: all
     std::map<std::string, std::string> skip;  // backend -> reason
 
     // Filled by compile().

@@ -42,7 +42,8 @@ Json value_spec(const std::string& text) {
     try {
         if (text.rfind("file:", 0) == 0) return {{"file", text.substr(5)}};
         if (text.rfind("json:", 0) == 0) return Json::parse(text.substr(5));
-        if (text.rfind("@", 0) == 0) return Json::parse(native::read_text(text.substr(1)), nullptr, true, true);
+        if (text.rfind("@", 0) == 0)
+            return Json::parse(native::read_text(text.substr(1)), nullptr, true, true);
         if (text.rfind("scene:", 0) == 0) return {{"scene", text.substr(6)}};
         if (text.rfind("pattern:", 0) == 0) {
             auto parts = split_all(text.substr(8), ',');
@@ -64,7 +65,8 @@ Json value_spec(const std::string& text) {
         return Json::parse(text);
     } catch (const Json::exception&) {
         throw Error("cannot read the value '" + text +
-                    "'; write file:PATH, pattern:NAME[,WxHxD], scene:NAME, u32:1,2,3 (also f32, i32, ...), @FILE.json "
+                    "'; write file:PATH, pattern:NAME[,WxHxD], scene:NAME, u32:1,2,3 (also f32, i32, ...), "
+                    "@FILE.json "
                     "or JSON");
     } catch (const std::logic_error&) {
         throw Error("cannot read a number in '" + text + "'");
@@ -163,7 +165,8 @@ void write_outputs(const CommandLine& c, const RunResult& result) {
             bool picture = path.ends_with(".png") || path.ends_with(".exr") || path.ends_with(".pfm");
             for (const Output& output : result.outputs)
                 if (!chosen || (picture && output.is_image && !chosen->is_image)) chosen = &output;
-            if (!chosen) throw Error("no shader writes an image or a buffer; there is nothing for '" + path + "'");
+            if (!chosen)
+                throw Error("no shader writes an image or a buffer; there is nothing for '" + path + "'");
         }
         write_output(*chosen, path);
         std::printf("wrote %s: %s\n", path.c_str(), output_title(*chosen).c_str());
@@ -173,7 +176,8 @@ void write_outputs(const CommandLine& c, const RunResult& result) {
 void print_timing(const char* who, const Job& job, const RunResult& result) {
     double rays = double(job.width) * job.height * job.depth;
     std::printf("%s: pipeline %.3f s, trace %.3f ms (%.2f M invocations/s)\n", who, result.create_seconds,
-                result.device_seconds * 1e3, result.device_seconds > 0 ? rays / result.device_seconds * 1e-6 : 0.0);
+                result.device_seconds * 1e3,
+                result.device_seconds > 0 ? rays / result.device_seconds * 1e-6 : 0.0);
     if (!result.launch_error.empty()) std::printf("%s: launch error %s\n", who, result.launch_error.c_str());
 }
 
@@ -227,9 +231,9 @@ int run(const CommandLine& c) {
     const RunResult& shown = ran_ours ? ours : theirs;
     if (c.compare) {
         for (const Difference& d : compare(ours, theirs, c.tolerance)) {
-            std::printf("%s: %zu of %zu differ (%.4f %%), largest difference %g%s\n", d.output.c_str(), d.differing,
-                        d.items, d.items ? 100.0 * double(d.differing) / double(d.items) : 0.0, d.largest,
-                        d.acceptable ? "" : ": too many");
+            std::printf("%s: %zu of %zu differ (%.4f %%), largest difference %g%s\n", d.output.c_str(),
+                        d.differing, d.items, d.items ? 100.0 * double(d.differing) / double(d.items) : 0.0,
+                        d.largest, d.acceptable ? "" : ": too many");
             for (const std::string& example : d.examples) std::printf("  %s\n", example.c_str());
             if (!d.acceptable) status = 1;
         }
@@ -245,9 +249,9 @@ int run(const CommandLine& c) {
         for (const Output& output : shown.outputs) {
             std::printf("%s\n", output_title(output).c_str());
             if (!c.print || !output.block) continue;
-            std::string text =
-                read_typed(*output.block, output.bytes.data(), output.bytes.size()).dump();
-            std::printf("  %s\n", text.size() > 4000 ? (text.substr(0, 4000) + " ...").c_str() : text.c_str());
+            std::string text = read_typed(*output.block, output.bytes.data(), output.bytes.size()).dump();
+            std::printf("  %s\n",
+                        text.size() > 4000 ? (text.substr(0, 4000) + " ...").c_str() : text.c_str());
         }
     host.context().require_silent_validation();
     return status;
@@ -258,8 +262,9 @@ int run(const CommandLine& c) {
 
 int main(int argc, char** argv) {
     rtc::run::CommandLine c;
-    CLI::App app{"rtc-run: run any ray tracing pipeline, by rtc or by the device's own ray tracing.\n"
-                 "Scene, bindings and case files are described in docs/rtc-run.md."};
+    CLI::App app{
+        "rtc-run: run any ray tracing pipeline, by rtc or by the device's own ray tracing.\n"
+        "Scene, bindings and case files are described in docs/rtc-run.md."};
     app.add_option("stages", c.stages, "GLSL (.rgen .rint .rahit .rchit .rmiss .rcall) or SPIR-V (.spv)");
     app.add_option("--hit-group", c.hit_groups, "NAME=a.rchit[,b.rahit][,c.rint]")->take_all();
     app.add_option("--scene", c.scene, "scene: .json .gltf .glb .obj .ply or builtin:NAME");
@@ -275,15 +280,19 @@ int main(int argc, char** argv) {
     app.add_option("--max-recursion-depth", c.recursion, "trace calls nested in trace calls");
     app.add_option("--max-callable-depth", c.callable_depth, "callables nested in callables");
     app.add_option("--native", c.native_kind, "nv or khr: run on the device's own extension");
-    app.add_flag("--compare", c.compare, "run rtc and native, report differences; status 1 beyond the tolerance");
-    app.add_option("--tolerance", c.tolerance.relative, "relative difference of floats that is no difference (1e-3)");
+    app.add_flag("--compare", c.compare,
+                 "run rtc and native, report differences; status 1 beyond the tolerance");
+    app.add_option("--tolerance", c.tolerance.relative,
+                   "relative difference of floats that is no difference (1e-3)");
     app.add_option("--allow", c.tolerance.allowed, "fraction of texels or words that may differ (0)");
     app.add_option("--device", c.device, "index, or part of the name");
-    app.add_option("-o,--output", c.outputs, "FILE or SET.BINDING=FILE; .png .exr .pfm .bin .json")->take_all();
+    app.add_option("-o,--output", c.outputs, "FILE or SET.BINDING=FILE; .png .exr .pfm .bin .json")
+        ->take_all();
     app.add_flag("--print", c.print, "print the buffers that shaders wrote");
     app.add_option("--repeat", c.repeats, "trace so many times and report the fastest");
     app.add_flag("-O", c.optimize, "let rtc optimise the module");
-    app.add_option("--resumable", c.resumable, "0 or 1: compile lanes that can suspend (default: as the device needs)");
+    app.add_option("--resumable", c.resumable,
+                   "0 or 1: compile lanes that can suspend (default: as the device needs)");
     app.add_option("--fetch", c.fetch, "acceleration structure through 0 texels, 1 a storage buffer");
     app.add_option("--step-budget", c.budget, "loop turns before a lane suspends");
     app.add_option("--save-module", c.save, "write the module rtc linked");

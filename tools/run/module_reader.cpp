@@ -41,13 +41,26 @@ std::string literal_string(const std::vector<uint32_t>& words, size_t from, size
 
 bool stage_of(uint32_t model, JobStage& stage) {
     switch (model) {
-        case spv::ExecutionModelRayGenerationKHR: stage = JobStage::RayGen; return true;
-        case spv::ExecutionModelIntersectionKHR: stage = JobStage::Intersection; return true;
-        case spv::ExecutionModelAnyHitKHR: stage = JobStage::AnyHit; return true;
-        case spv::ExecutionModelClosestHitKHR: stage = JobStage::ClosestHit; return true;
-        case spv::ExecutionModelMissKHR: stage = JobStage::Miss; return true;
-        case spv::ExecutionModelCallableKHR: stage = JobStage::Callable; return true;
-        default: return false;
+        case spv::ExecutionModelRayGenerationKHR:
+            stage = JobStage::RayGen;
+            return true;
+        case spv::ExecutionModelIntersectionKHR:
+            stage = JobStage::Intersection;
+            return true;
+        case spv::ExecutionModelAnyHitKHR:
+            stage = JobStage::AnyHit;
+            return true;
+        case spv::ExecutionModelClosestHitKHR:
+            stage = JobStage::ClosestHit;
+            return true;
+        case spv::ExecutionModelMissKHR:
+            stage = JobStage::Miss;
+            return true;
+        case spv::ExecutionModelCallableKHR:
+            stage = JobStage::Callable;
+            return true;
+        default:
+            return false;
     }
 }
 
@@ -86,7 +99,8 @@ class Reader {
         reach(function);
         for (const Instruction& i : instructions_) {
             if (i.op == spv::OpVariable) variable(i, module);
-            if (i.op == spv::OpSpecConstant || i.op == spv::OpSpecConstantTrue || i.op == spv::OpSpecConstantFalse)
+            if (i.op == spv::OpSpecConstant || i.op == spv::OpSpecConstantTrue ||
+                i.op == spv::OpSpecConstantFalse)
                 constant(i, module);
         }
         module.traces = traces_;
@@ -103,26 +117,58 @@ class Reader {
                 if (w.size() < count) throw Error(file_ + ": malformed SPIR-V instruction");
             };
             switch (op) {
-                case spv::OpName: need(2); names_[w[0]] = literal_string(w, 1); break;
-                case spv::OpMemberName: need(3); member_names_[w[0]][w[1]] = literal_string(w, 2); break;
-                case spv::OpDecorate: need(2); decorations_[w[0]].own[w[1]] = {w.begin() + 2, w.end()}; break;
+                case spv::OpName:
+                    need(2);
+                    names_[w[0]] = literal_string(w, 1);
+                    break;
+                case spv::OpMemberName:
+                    need(3);
+                    member_names_[w[0]][w[1]] = literal_string(w, 2);
+                    break;
+                case spv::OpDecorate:
+                    need(2);
+                    decorations_[w[0]].own[w[1]] = {w.begin() + 2, w.end()};
+                    break;
                 case spv::OpMemberDecorate:
                     need(3);
                     decorations_[w[0]].members[w[1]][w[2]] = {w.begin() + 3, w.end()};
                     break;
-                case spv::OpTypeForwardPointer: break;
-                case spv::OpTypeVoid: case spv::OpTypeBool: case spv::OpTypeInt: case spv::OpTypeFloat:
-                case spv::OpTypeVector: case spv::OpTypeMatrix: case spv::OpTypeImage: case spv::OpTypeSampler:
-                case spv::OpTypeSampledImage: case spv::OpTypeArray: case spv::OpTypeRuntimeArray:
-                case spv::OpTypeStruct: case spv::OpTypePointer: case spv::OpTypeFunction:
-                case spv::OpTypeAccelerationStructureKHR: case spv::OpTypeRayQueryKHR:
+                case spv::OpTypeForwardPointer:
+                    break;
+                case spv::OpTypeVoid:
+                case spv::OpTypeBool:
+                case spv::OpTypeInt:
+                case spv::OpTypeFloat:
+                case spv::OpTypeVector:
+                case spv::OpTypeMatrix:
+                case spv::OpTypeImage:
+                case spv::OpTypeSampler:
+                case spv::OpTypeSampledImage:
+                case spv::OpTypeArray:
+                case spv::OpTypeRuntimeArray:
+                case spv::OpTypeStruct:
+                case spv::OpTypePointer:
+                case spv::OpTypeFunction:
+                case spv::OpTypeAccelerationStructureKHR:
+                case spv::OpTypeRayQueryKHR:
                     need(1);
                     definitions_[w[0]] = n;
                     break;
-                case spv::OpConstant: case spv::OpSpecConstant: need(3); definitions_[w[1]] = n; break;
-                case spv::OpFunction: need(2); function = w[1]; bodies_[function] = {n, n}; break;
-                case spv::OpFunctionEnd: bodies_[function].second = n; break;
-                default: break;
+                case spv::OpConstant:
+                case spv::OpSpecConstant:
+                    need(3);
+                    definitions_[w[1]] = n;
+                    break;
+                case spv::OpFunction:
+                    need(2);
+                    function = w[1];
+                    bodies_[function] = {n, n};
+                    break;
+                case spv::OpFunctionEnd:
+                    bodies_[function].second = n;
+                    break;
+                default:
+                    break;
             }
         }
     }
@@ -143,7 +189,8 @@ class Reader {
 
     const Instruction& define(uint32_t id) const {
         auto found = definitions_.find(id);
-        if (found == definitions_.end()) throw Error(file_ + ": SPIR-V id " + std::to_string(id) + " is no type");
+        if (found == definitions_.end())
+            throw Error(file_ + ": SPIR-V id " + std::to_string(id) + " is no type");
         return instructions_[found->second];
     }
 
@@ -169,7 +216,9 @@ class Reader {
         const auto& [op, w] = define(id);
         auto nested = [&](uint32_t inner) { return type(inner, matrix_stride, row_major, depth + 1); };
         switch (op) {
-            case spv::OpTypeBool: made->kind = Type::Kind::Bool; break;
+            case spv::OpTypeBool:
+                made->kind = Type::Kind::Bool;
+                break;
             case spv::OpTypeInt:
                 made->kind = w[2] ? Type::Kind::Int : Type::Kind::Uint;
                 made->width = w[1];
@@ -211,14 +260,16 @@ class Reader {
                             const auto& d = member->second;
                             if (auto o = d.find(spv::DecorationOffset); o != d.end() && !o->second.empty())
                                 offset = o->second[0];
-                            if (auto s = d.find(spv::DecorationMatrixStride); s != d.end() && !s->second.empty())
+                            if (auto s = d.find(spv::DecorationMatrixStride);
+                                s != d.end() && !s->second.empty())
                                 stride = s->second[0];
                             rows = d.count(spv::DecorationRowMajor) > 0;
                         }
                     }
                     Type::Member out;
                     auto names = member_names_.find(id);
-                    if (names != member_names_.end() && names->second.count(m)) out.name = names->second.at(m);
+                    if (names != member_names_.end() && names->second.count(m))
+                        out.name = names->second.at(m);
                     out.type = type(w[m + 1], stride, rows, depth + 1);
                     out.offset = offset;
                     running = offset + out.type->size();
@@ -226,8 +277,13 @@ class Reader {
                 }
                 break;
             }
-            case spv::OpTypePointer: made->kind = Type::Kind::Address; made->width = 64; break;
-            default: made->kind = Type::Kind::Opaque; break;
+            case spv::OpTypePointer:
+                made->kind = Type::Kind::Address;
+                made->width = 64;
+                break;
+            default:
+                made->kind = Type::Kind::Opaque;
+                break;
         }
         return made;
     }
@@ -243,7 +299,7 @@ class Reader {
         const auto& w = define(id).words;
         if (w.size() < 8) throw Error(file_ + ": malformed OpTypeImage");
         const Instruction& component = define(w[1]);
-        out.image.component = component.op == spv::OpTypeFloat ? Type::Kind::Float
+        out.image.component = component.op == spv::OpTypeFloat                   ? Type::Kind::Float
                               : component.words.size() > 2 && component.words[2] ? Type::Kind::Int
                                                                                  : Type::Kind::Uint;
         out.image.dim = w[2];
@@ -252,7 +308,8 @@ class Reader {
         out.image.format = w[7];
         bool storage = w[6] == 2;
         if (w[2] == spv::DimBuffer)
-            out.type = storage ? VK_DESCRIPTOR_TYPE_STORAGE_TEXEL_BUFFER : VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER;
+            out.type =
+                storage ? VK_DESCRIPTOR_TYPE_STORAGE_TEXEL_BUFFER : VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER;
         else
             out.type = storage ? VK_DESCRIPTOR_TYPE_STORAGE_IMAGE : VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE;
     }
@@ -288,7 +345,8 @@ class Reader {
         const Instruction& core = define(inner);
         switch (core.op) {
             case spv::OpTypeStruct: {
-                bool buffer = storage == spv::StorageClassStorageBuffer || decorated(inner, spv::DecorationBufferBlock);
+                bool buffer =
+                    storage == spv::StorageClassStorageBuffer || decorated(inner, spv::DecorationBufferBlock);
                 out.type = buffer ? VK_DESCRIPTOR_TYPE_STORAGE_BUFFER : VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER;
                 out.writable = buffer && !decorated(id, spv::DecorationNonWritable) &&
                                !member_decorated(inner, spv::DecorationNonWritable);
@@ -296,8 +354,12 @@ class Reader {
                 if (out.name.empty() && names_.count(inner)) out.name = names_.at(inner);
                 break;
             }
-            case spv::OpTypeAccelerationStructureKHR: out.acceleration_structure = true; break;
-            case spv::OpTypeSampler: out.type = VK_DESCRIPTOR_TYPE_SAMPLER; break;
+            case spv::OpTypeAccelerationStructureKHR:
+                out.acceleration_structure = true;
+                break;
+            case spv::OpTypeSampler:
+                out.type = VK_DESCRIPTOR_TYPE_SAMPLER;
+                break;
             case spv::OpTypeSampledImage:
                 image(core.words[1], out);
                 if (out.image.dim != spv::DimBuffer) out.type = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER;
@@ -308,7 +370,8 @@ class Reader {
                                 out.type == VK_DESCRIPTOR_TYPE_STORAGE_TEXEL_BUFFER) &&
                                !decorated(id, spv::DecorationNonWritable);
                 break;
-            default: return;
+            default:
+                return;
         }
         module.resources.push_back(std::move(out));
     }
@@ -340,18 +403,27 @@ class Reader {
 
 uint32_t Type::size() const {
     switch (kind) {
-        case Kind::Bool: return 4;
-        case Kind::Int: case Kind::Uint: case Kind::Float: return width / 8;
-        case Kind::Vector: return count * stride;
-        case Kind::Matrix: return stride * (row_major ? element->count : count);
-        case Kind::Array: return count * stride;
-        case Kind::Address: return 8;
+        case Kind::Bool:
+            return 4;
+        case Kind::Int:
+        case Kind::Uint:
+        case Kind::Float:
+            return width / 8;
+        case Kind::Vector:
+            return count * stride;
+        case Kind::Matrix:
+            return stride * (row_major ? element->count : count);
+        case Kind::Array:
+            return count * stride;
+        case Kind::Address:
+            return 8;
         case Kind::Struct: {
             uint32_t end = 0;
             for (const Member& member : members) end = std::max(end, member.offset + member.type->size());
             return end;
         }
-        case Kind::Opaque: return 0;
+        case Kind::Opaque:
+            return 0;
     }
     return 0;
 }

@@ -23,10 +23,10 @@ struct Type {
         uint32_t offset = 0;
     };
     Kind kind = Kind::Opaque;
-    uint32_t width = 32;    // bits of a scalar
-    uint32_t count = 0;     // vector components, matrix columns, array elements; 0: run-time array
-    uint32_t stride = 0;    // array elements, matrix columns (or rows)
-    bool row_major = false; // of a matrix
+    uint32_t width = 32;     // bits of a scalar
+    uint32_t count = 0;      // vector components, matrix columns, array elements; 0: run-time array
+    uint32_t stride = 0;     // array elements, matrix columns (or rows)
+    bool row_major = false;  // of a matrix
     std::shared_ptr<const Type> element;
     std::vector<Member> members;
     uint32_t size() const;  // bytes; a run-time array counts no element
@@ -47,8 +47,8 @@ struct Resource {
     bool acceleration_structure = false;
     uint32_t count = 1;  // 0: run-time array
     bool writable = false;
-    TypeRef block;       // buffers
-    ImageShape image;    // images and texel buffers
+    TypeRef block;     // buffers
+    ImageShape image;  // images and texel buffers
 };
 
 struct SpecConstant {

@@ -39,7 +39,8 @@ uint64_t bits_at(const Bytes& bytes, size_t index, const Scalar& scalar) {
 
 double as_double(uint64_t bits, const Scalar& scalar) {
     if (scalar.kind != Type::Kind::Float)
-        return scalar.kind == Type::Kind::Int ? double(scalar.width == 32 ? int32_t(bits) : int64_t(bits)) : double(bits);
+        return scalar.kind == Type::Kind::Int ? double(scalar.width == 32 ? int32_t(bits) : int64_t(bits))
+                                              : double(bits);
     if (scalar.width == 64) {
         double value;
         std::memcpy(&value, &bits, 8);
@@ -94,7 +95,8 @@ std::vector<CellResult> check_expectations(const Job& job, const RunResult& resu
             for (size_t i = expect.at; (i + 1) * (scalar.width / 8) <= truth->bytes.size(); ++i)
                 wanted.push_back(bits_at(truth->bytes, i, scalar));
         } else {
-            for (const Json& value : expect.values) wanted.push_back(number_bits(value, scalar.kind, scalar.width));
+            for (const Json& value : expect.values)
+                wanted.push_back(number_bits(value, scalar.kind, scalar.width));
         }
         for (size_t i = 0; i < wanted.size(); ++i) {
             uint64_t got = bits_at(output->bytes, expect.at + i, scalar);
@@ -104,8 +106,8 @@ std::vector<CellResult> check_expectations(const Job& job, const RunResult& resu
                 continue;
             cell.passed = false;
             cell.known = expect.native;
-            cell.detail = "value " + std::to_string(expect.at + i) + ": " + show(got, scalar) + ", expected " +
-                          show(wanted[i], scalar);
+            cell.detail = "value " + std::to_string(expect.at + i) + ": " + show(got, scalar) +
+                          ", expected " + show(wanted[i], scalar);
             break;
         }
         cells.push_back(std::move(cell));
@@ -132,7 +134,8 @@ std::vector<Difference> compare(const RunResult& a, const RunResult& b, const To
                 bool same = true;
                 for (uint32_t c = 0; c < channels; ++c) {
                     double p = left[texel * channels + c], q = right[texel * channels + c];
-                    if (p != q && !(std::isnan(p) && std::isnan(q))) d.largest = std::max(d.largest, std::fabs(p - q));
+                    if (p != q && !(std::isnan(p) && std::isnan(q)))
+                        d.largest = std::max(d.largest, std::fabs(p - q));
                     same &= close(p, q, tolerance.absolute, tolerance.relative);
                 }
                 if (same) continue;
@@ -160,7 +163,8 @@ std::vector<Difference> compare(const RunResult& a, const RunResult& b, const To
                 if (p == q) continue;
                 if (floats) {
                     d.largest = std::max(d.largest, std::fabs(as_double(p, scalar) - as_double(q, scalar)));
-                    if (close(as_double(p, scalar), as_double(q, scalar), tolerance.absolute, tolerance.relative))
+                    if (close(as_double(p, scalar), as_double(q, scalar), tolerance.absolute,
+                              tolerance.relative))
                         continue;
                 }
                 note("word " + std::to_string(word), show(p, scalar), show(q, scalar));
@@ -189,13 +193,14 @@ std::string output_title(const Output& output) {
 void write_output(const Output& output, const std::string& path) {
     auto ends = [&](const char* extension) { return path.ends_with(extension); };
     if (ends(".png") || ends(".exr") || ends(".pfm")) {
-        if (!output.is_image) throw Error(path + ": binding " + slot_name(output.slot) + " is a buffer; write .bin or .json");
+        if (!output.is_image)
+            throw Error(path + ": binding " + slot_name(output.slot) + " is a buffer; write .bin or .json");
         auto values = decode_texels(output.bytes, output.format);
         uint32_t channels = std::max(output.format.channels, 1u), out_channels = channels == 2 ? 3 : channels;
         if (ends(".pfm") && out_channels == 4) out_channels = 3;
         if (ends(".png") && out_channels == 4) out_channels = 3;
-        tools::Picture picture(output.extent.width, output.extent.height * output.extent.depth * output.layers,
-                               out_channels);
+        tools::Picture picture(output.extent.width,
+                               output.extent.height * output.extent.depth * output.layers, out_channels);
         double scale = output.format.component == Type::Kind::Float ? 1.0 : 1.0 / 255;
         for (size_t texel = 0; texel < values.size() / channels; ++texel)
             for (uint32_t c = 0; c < out_channels; ++c)

@@ -20,25 +20,39 @@ using tools::MemoryKind;
 
 const char* launch_error_name(uint32_t code) {
     switch (code) {
-        case RTC_LAUNCH_ERROR_RECURSION_DEPTH: return "recursion-depth";
-        case RTC_LAUNCH_ERROR_CALLABLE_DEPTH: return "callable-depth";
-        case RTC_LAUNCH_ERROR_BAD_HANDLE: return "bad-handle";
-        case RTC_LAUNCH_ERROR_ABI: return "abi";
-        case RTC_LAUNCH_ERROR_ASSUMPTION: return "assumption";
-        case RTC_LAUNCH_ERROR_UNFINISHED: return "unfinished";
-        case RTC_LAUNCH_ERROR_STACK: return "stack";
-        default: return "unknown";
+        case RTC_LAUNCH_ERROR_RECURSION_DEPTH:
+            return "recursion-depth";
+        case RTC_LAUNCH_ERROR_CALLABLE_DEPTH:
+            return "callable-depth";
+        case RTC_LAUNCH_ERROR_BAD_HANDLE:
+            return "bad-handle";
+        case RTC_LAUNCH_ERROR_ABI:
+            return "abi";
+        case RTC_LAUNCH_ERROR_ASSUMPTION:
+            return "assumption";
+        case RTC_LAUNCH_ERROR_UNFINISHED:
+            return "unfinished";
+        case RTC_LAUNCH_ERROR_STACK:
+            return "stack";
+        default:
+            return "unknown";
     }
 }
 
 rtcc_stage stage_of(tools::JobStage stage) {
     switch (stage) {
-        case tools::JobStage::RayGen: return RTCC_STAGE_RAYGEN;
-        case tools::JobStage::Intersection: return RTCC_STAGE_INTERSECTION;
-        case tools::JobStage::AnyHit: return RTCC_STAGE_ANY_HIT;
-        case tools::JobStage::ClosestHit: return RTCC_STAGE_CLOSEST_HIT;
-        case tools::JobStage::Miss: return RTCC_STAGE_MISS;
-        case tools::JobStage::Callable: return RTCC_STAGE_CALLABLE;
+        case tools::JobStage::RayGen:
+            return RTCC_STAGE_RAYGEN;
+        case tools::JobStage::Intersection:
+            return RTCC_STAGE_INTERSECTION;
+        case tools::JobStage::AnyHit:
+            return RTCC_STAGE_ANY_HIT;
+        case tools::JobStage::ClosestHit:
+            return RTCC_STAGE_CLOSEST_HIT;
+        case tools::JobStage::Miss:
+            return RTCC_STAGE_MISS;
+        case tools::JobStage::Callable:
+            return RTCC_STAGE_CALLABLE;
     }
     return RTCC_STAGE_AUTO;
 }
@@ -77,7 +91,8 @@ class RtcExecutor final : public Executor {
         std::vector<std::unique_ptr<native::NvGeometries>> inputs;
         std::vector<VkAccelerationStructureInfoNV> infos;
         VkDeviceSize heap_size = 4096, scratch_size = 256;
-        auto create = [&](const VkAccelerationStructureInfoNV& info, std::vector<RtrAccelerationStructure>& out) {
+        auto create = [&](const VkAccelerationStructureInfoNV& info,
+                          std::vector<RtrAccelerationStructure>& out) {
             VkAccelerationStructureCreateInfoNV create_info{};
             create_info.sType = VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_CREATE_INFO_NV;
             create_info.info = info;
@@ -86,11 +101,13 @@ class RtcExecutor final : public Executor {
                  "rtrCreateAccelerationStructure");
             out.push_back(as);
             heap_size += size_of(as, VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_OBJECT_NV) + 256;
-            scratch_size = std::max(
-                scratch_size, size_of(as, VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_BUILD_SCRATCH_NV));
+            scratch_size =
+                std::max(scratch_size,
+                         size_of(as, VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_BUILD_SCRATCH_NV));
         };
         for (const native::Bottom& bottom : world.bottoms) {
-            inputs.push_back(std::make_unique<native::NvGeometries>(context_, bottom, RTR_INPUT_BUFFER_USAGE));
+            inputs.push_back(
+                std::make_unique<native::NvGeometries>(context_, bottom, RTR_INPUT_BUFFER_USAGE));
             VkAccelerationStructureInfoNV info{};
             info.sType = VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV;
             info.type = VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_NV;
@@ -123,14 +140,15 @@ class RtcExecutor final : public Executor {
                          heap_, size_of(as, VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_OBJECT_NV), 0,
                          &bind.heapOffset),
                      "rtrAllocateHeapRange");
-                need(rtrBindAccelerationStructureMemory(device_, 1, &bind), "rtrBindAccelerationStructureMemory");
+                need(rtrBindAccelerationStructureMemory(device_, 1, &bind),
+                     "rtrBindAccelerationStructureMemory");
             }
         Buffer scratch(context_, scratch_size, RTR_SCRATCH_BUFFER_USAGE, MemoryKind::Device);
         RtrRecorder recorder = nullptr;
         RtrRecorderCreateInfo recorder_info{};
         need(rtrCreateRecorder(device_, &recorder_info, nullptr, &recorder), "rtrCreateRecorder");
-        auto one = [&](const VkAccelerationStructureInfoNV& info, RtrAccelerationStructure as, VkBuffer instances,
-                       bool first) {
+        auto one = [&](const VkAccelerationStructureInfoNV& info, RtrAccelerationStructure as,
+                       VkBuffer instances, bool first) {
             context_.run([&](VkCommandBuffer commands) {
                 need(rtrBeginRecorder(recorder, commands), "rtrBeginRecorder");
                 if (first) need(rtrCmdInitializeHeap(recorder, heap_), "rtrCmdInitializeHeap");
@@ -166,7 +184,8 @@ class RtcExecutor final : public Executor {
         rtrDestroyRecorder(device_, recorder, nullptr);
     }
 
-    void create_pipeline(const tools::JobPipeline& pipeline, const std::vector<VkDescriptorSetLayout>& set_layouts,
+    void create_pipeline(const tools::JobPipeline& pipeline,
+                         const std::vector<VkDescriptorSetLayout>& set_layouts,
                          uint32_t push_bytes) override {
         compile(pipeline);
         VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, push_bytes};
@@ -188,7 +207,8 @@ class RtcExecutor final : public Executor {
 
     void set_tables(const native::Tables& tables) override {
         std::vector<uint8_t> handles(size_t(group_count_) * RTC_HANDLE_BYTES);
-        need(rtrGetRayTracingShaderGroupHandles(device_, pipeline_, 0, group_count_, handles.size(), handles.data()),
+        need(rtrGetRayTracingShaderGroupHandles(device_, pipeline_, 0, group_count_, handles.size(),
+                                                handles.data()),
              "rtrGetRayTracingShaderGroupHandles");
         table_ = native::lay_out(tables, handles,
                                  {RTC_HANDLE_BYTES, RTC_SBT_HANDLE_ALIGNMENT, RTC_SBT_BASE_ALIGNMENT});
@@ -231,20 +251,23 @@ class RtcExecutor final : public Executor {
         need(rtrBeginRecorder(recorder_, commands), "rtrBeginRecorder");
         need(rtrCmdSetHeap(recorder_, heap_), "rtrCmdSetHeap");
         if (scratch_.handle)
-            need(rtrCmdSetLaunchScratch(recorder_, scratch_.handle, 0, scratch_.size), "rtrCmdSetLaunchScratch");
+            need(rtrCmdSetLaunchScratch(recorder_, scratch_.handle, 0, scratch_.size),
+                 "rtrCmdSetLaunchScratch");
         need(rtrCmdBindPipeline(recorder_, pipeline_), "rtrCmdBindPipeline");
         if (!launch.sets.empty())
-            need(rtrCmdBindDescriptorSets(recorder_, 0, uint32_t(launch.sets.size()), launch.sets.data(), 0, nullptr),
+            need(rtrCmdBindDescriptorSets(recorder_, 0, uint32_t(launch.sets.size()), launch.sets.data(), 0,
+                                          nullptr),
                  "rtrCmdBindDescriptorSets");
         if (!launch.push_constants.empty())
             need(rtrCmdPushConstants(recorder_, 0, uint32_t(launch.push_constants.size()),
                                      launch.push_constants.data()),
                  "rtrCmdPushConstants");
         auto region = [&](const native::TableLayout::Region& r) {
-            return RtrStridedBufferRegion{r.size ? table_buffer_.handle : VK_NULL_HANDLE, r.offset, r.stride, r.size};
+            return RtrStridedBufferRegion{r.size ? table_buffer_.handle : VK_NULL_HANDLE, r.offset, r.stride,
+                                          r.size};
         };
-        RtrStridedBufferRegion raygen = region(table_.raygen), miss = region(table_.miss), hit = region(table_.hit),
-                               callable = region(table_.callable);
+        RtrStridedBufferRegion raygen = region(table_.raygen), miss = region(table_.miss),
+                               hit = region(table_.hit), callable = region(table_.callable);
         need(rtrCmdTraceRaysRegions(recorder_, &raygen, &miss, &hit, &callable, launch.width, launch.height,
                                     launch.depth),
              "rtrCmdTraceRaysRegions");
@@ -284,14 +307,14 @@ class RtcExecutor final : public Executor {
         Owned<rtcc_pipeline_t, rtcc_pipeline_release> pipeline(rtcc_pipeline_create());
         rtcc_options_set_max_recursion_depth(options, job.max_recursion);
         rtcc_options_set_max_callable_depth(options, job.max_callable_depth);
-        rtcc_options_set_optimization(options,
-                                      options_.optimize ? RTCC_OPTIMIZATION_PERFORMANCE : RTCC_OPTIMIZATION_NONE);
+        rtcc_options_set_optimization(
+            options, options_.optimize ? RTCC_OPTIMIZATION_PERFORMANCE : RTCC_OPTIMIZATION_NONE);
         bool needed = rtrGetDeviceSupport(device_)->needsResumableModules;
         rtcc_options_set_resumable(options, options_.resumable < 0 ? needed : options_.resumable);
         for (const tools::JobShader& shader : job.shaders) {
-            int32_t stage =
-                rtcc_pipeline_add_spirv(pipeline, stage_of(shader.stage), shader.name.c_str(), shader.file.c_str(),
-                                        shader.spirv.data(), shader.spirv.size(), shader.entry.c_str());
+            int32_t stage = rtcc_pipeline_add_spirv(pipeline, stage_of(shader.stage), shader.name.c_str(),
+                                                    shader.file.c_str(), shader.spirv.data(),
+                                                    shader.spirv.size(), shader.entry.c_str());
             if (stage < 0) throw Error("stage " + shader.name + " was refused (is its name unique?)");
             for (const auto& constant : shader.constants)
                 rtcc_pipeline_specialize(pipeline, stage, constant.id, constant.value);
@@ -351,7 +374,8 @@ RtcDevice::RtcDevice(const native::Context& c) : context(c) {
     info.pfnGetInstanceProcAddr = vkGetInstanceProcAddr;
     info.pMessenger = &messenger;
     VkResult result = rtrCreateDevice(&info, nullptr, &handle);
-    if (result != VK_SUCCESS) throw Error(std::string("rtrCreateDevice: ") + tools::result_name(result) + said);
+    if (result != VK_SUCCESS)
+        throw Error(std::string("rtrCreateDevice: ") + tools::result_name(result) + said);
 }
 
 RtcDevice::~RtcDevice() { rtrDestroyDevice(handle, nullptr); }

@@ -39,7 +39,8 @@ void only_keys(const Json& json, std::initializer_list<const char*> known, const
         }
 }
 
-uint32_t flags_of(const Json& json, std::initializer_list<std::pair<const char*, uint32_t>> names, const char* what) {
+uint32_t flags_of(const Json& json, std::initializer_list<std::pair<const char*, uint32_t>> names,
+                  const char* what) {
     if (json.is_number()) return json.get<uint32_t>();
     uint32_t flags = 0;
     for (const Json& item : json) {
@@ -124,35 +125,40 @@ Placement instance_of(const Json& json, const World& world) {
 }  // namespace
 
 World parse_scene(const Json& json, const std::string& folder) {
-    if (json.is_string()) return load_scene((std::filesystem::path(folder) / json.get<std::string>()).string());
+    if (json.is_string())
+        return load_scene((std::filesystem::path(folder) / json.get<std::string>()).string());
     only_keys(json, {"meshes", "instances", "tops"}, "scene");
     World world;
     for (const Json& mesh : json.value("meshes", Json::array())) {
-        only_keys(mesh, {"name", "geometries", "file", "flags", "triangles", "vertices", "indices", "boxes",
-                         "geometry-flags"},
+        only_keys(mesh,
+                  {"name", "geometries", "file", "flags", "triangles", "vertices", "indices", "boxes",
+                   "geometry-flags"},
                   "mesh");
         Bottom bottom;
         bottom.name = mesh.value("name", "mesh" + std::to_string(world.bottoms.size()));
         if (mesh.contains("file")) {
-            World loaded = load_scene((std::filesystem::path(folder) / mesh["file"].get<std::string>()).string());
+            World loaded =
+                load_scene((std::filesystem::path(folder) / mesh["file"].get<std::string>()).string());
             for (Bottom& part : loaded.bottoms)
                 for (Geometry& geometry : part.geometries) bottom.geometries.push_back(std::move(geometry));
         } else if (mesh.contains("geometries")) {
-            for (const Json& geometry : mesh["geometries"]) bottom.geometries.push_back(geometry_of(geometry));
+            for (const Json& geometry : mesh["geometries"])
+                bottom.geometries.push_back(geometry_of(geometry));
         } else {
             Json geometry = mesh;
             for (const char* key : {"name", "flags", "geometry-flags"}) geometry.erase(key);
             if (mesh.contains("geometry-flags")) geometry["flags"] = mesh["geometry-flags"];
             bottom.geometries.push_back(geometry_of(geometry));
         }
-        bottom.flags = mesh.contains("flags")
-                           ? flags_of(mesh["flags"],
-                                      {{"fast-trace", VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_TRACE_BIT_KHR},
-                                       {"fast-build", VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_BUILD_BIT_KHR},
-                                       {"low-memory", VK_BUILD_ACCELERATION_STRUCTURE_LOW_MEMORY_BIT_KHR},
-                                       {"allow-update", VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_KHR}},
-                                      "mesh flags")
-                           : bottom.flags;
+        bottom.flags =
+            mesh.contains("flags")
+                ? flags_of(mesh["flags"],
+                           {{"fast-trace", VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_TRACE_BIT_KHR},
+                            {"fast-build", VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_BUILD_BIT_KHR},
+                            {"low-memory", VK_BUILD_ACCELERATION_STRUCTURE_LOW_MEMORY_BIT_KHR},
+                            {"allow-update", VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_KHR}},
+                           "mesh flags")
+                : bottom.flags;
         world.bottoms.push_back(std::move(bottom));
     }
     auto top_of = [&](const std::string& name, const Json& instances) {
@@ -177,7 +183,8 @@ World load_scene(const std::string& path) {
     std::filesystem::path p(path);
     if (p.extension() == ".json") {
         try {
-            return parse_scene(Json::parse(native::read_text(path), nullptr, true, true), p.parent_path().string());
+            return parse_scene(Json::parse(native::read_text(path), nullptr, true, true),
+                               p.parent_path().string());
         } catch (const Json::exception& e) {
             throw Error(path + ": " + e.what());
         } catch (const Error& e) {
@@ -188,8 +195,8 @@ World load_scene(const std::string& path) {
 }
 
 World default_scene() {
-    return parse_scene(Json::parse(R"({"meshes": [{"name": "triangle", "triangles": [[-1,-1,2, 3,-1,2, -1,3,2]]}]})"),
-                       ".");
+    return parse_scene(
+        Json::parse(R"({"meshes": [{"name": "triangle", "triangles": [[-1,-1,2, 3,-1,2, -1,3,2]]}]})"), ".");
 }
 
 }  // namespace rtc::run

@@ -23,24 +23,37 @@ namespace {
 const char* type_name(const Resource& resource) {
     if (resource.acceleration_structure) return "an acceleration structure";
     switch (resource.type) {
-        case VK_DESCRIPTOR_TYPE_SAMPLER: return "a sampler";
-        case VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER: return "a combined image sampler";
-        case VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE: return "a sampled image";
-        case VK_DESCRIPTOR_TYPE_STORAGE_IMAGE: return "a storage image";
-        case VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER: return "a uniform texel buffer";
-        case VK_DESCRIPTOR_TYPE_STORAGE_TEXEL_BUFFER: return "a storage texel buffer";
-        case VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER: return "a uniform buffer";
-        case VK_DESCRIPTOR_TYPE_STORAGE_BUFFER: return "a storage buffer";
-        default: return "another descriptor";
+        case VK_DESCRIPTOR_TYPE_SAMPLER:
+            return "a sampler";
+        case VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER:
+            return "a combined image sampler";
+        case VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE:
+            return "a sampled image";
+        case VK_DESCRIPTOR_TYPE_STORAGE_IMAGE:
+            return "a storage image";
+        case VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER:
+            return "a uniform texel buffer";
+        case VK_DESCRIPTOR_TYPE_STORAGE_TEXEL_BUFFER:
+            return "a storage texel buffer";
+        case VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER:
+            return "a uniform buffer";
+        case VK_DESCRIPTOR_TYPE_STORAGE_BUFFER:
+            return "a storage buffer";
+        default:
+            return "another descriptor";
     }
 }
 
 VkImageViewType view_type(const ImageShape& shape) {
     switch (shape.dim) {
-        case 0: return shape.arrayed ? VK_IMAGE_VIEW_TYPE_1D_ARRAY : VK_IMAGE_VIEW_TYPE_1D;
-        case 2: return VK_IMAGE_VIEW_TYPE_3D;
-        case 3: return shape.arrayed ? VK_IMAGE_VIEW_TYPE_CUBE_ARRAY : VK_IMAGE_VIEW_TYPE_CUBE;
-        default: return shape.arrayed ? VK_IMAGE_VIEW_TYPE_2D_ARRAY : VK_IMAGE_VIEW_TYPE_2D;
+        case 0:
+            return shape.arrayed ? VK_IMAGE_VIEW_TYPE_1D_ARRAY : VK_IMAGE_VIEW_TYPE_1D;
+        case 2:
+            return VK_IMAGE_VIEW_TYPE_3D;
+        case 3:
+            return shape.arrayed ? VK_IMAGE_VIEW_TYPE_CUBE_ARRAY : VK_IMAGE_VIEW_TYPE_CUBE;
+        default:
+            return shape.arrayed ? VK_IMAGE_VIEW_TYPE_2D_ARRAY : VK_IMAGE_VIEW_TYPE_2D;
     }
 }
 
@@ -67,7 +80,8 @@ class Session {
             vkDestroyBufferView(context_.device, bound.view, nullptr);
         }
         vkDestroyDescriptorPool(context_.device, pool_, nullptr);
-        for (VkDescriptorSetLayout layout : layouts_) vkDestroyDescriptorSetLayout(context_.device, layout, nullptr);
+        for (VkDescriptorSetLayout layout : layouts_)
+            vkDestroyDescriptorSetLayout(context_.device, layout, nullptr);
     }
 
     RunResult run(unsigned repeats) {
@@ -165,7 +179,8 @@ class Session {
         size_t size = resource.block ? resource.block->size() : 0;
         if (!resource.block || resource.block->members.empty()) return std::max<size_t>(size, 16);
         const auto& last = resource.block->members.back();
-        if (last.type->kind == Type::Kind::Array && last.type->count == 0)  // one element an invocation, and some more
+        if (last.type->kind == Type::Kind::Array &&
+            last.type->count == 0)  // one element an invocation, and some more
             size = last.offset + size_t(last.type->stride) *
                                      std::max<size_t>(64, size_t(job_.width) * job_.height * job_.depth);
         return std::max<size_t>(size, 16);
@@ -177,7 +192,8 @@ class Session {
             case VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER:
             case VK_DESCRIPTOR_TYPE_STORAGE_BUFFER: {
                 size_t size = default_buffer_size(resource);
-                if (spec.is_object() && spec.contains("size")) size = std::max<size_t>(16, spec["size"].get<size_t>());
+                if (spec.is_object() && spec.contains("size"))
+                    size = std::max<size_t>(16, spec["size"].get<size_t>());
                 if (is_sequence(spec)) {
                     // Addresses may name buffers that do not exist yet: only the length matters here.
                     AddressOf none = [](const std::string&) { return uint64_t(0); };
@@ -189,7 +205,8 @@ class Session {
                                                ? VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT
                                                : VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
                 if (context_.device_addresses) usage |= VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT;
-                bound.buffer = std::make_unique<Buffer>(context_, (size + 15) / 16 * 16, usage, MemoryKind::Readback);
+                bound.buffer =
+                    std::make_unique<Buffer>(context_, (size + 15) / 16 * 16, usage, MemoryKind::Readback);
                 return;
             }
             case VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER:
@@ -209,19 +226,25 @@ class Session {
                 check(vkCreateBufferView(context_.device, &view, nullptr, &bound.view), "vkCreateBufferView");
                 return;
             }
-            case VK_DESCRIPTOR_TYPE_SAMPLER: make_sampler(bound, spec, true); return;
+            case VK_DESCRIPTOR_TYPE_SAMPLER:
+                make_sampler(bound, spec, true);
+                return;
             case VK_DESCRIPTOR_TYPE_STORAGE_IMAGE:
-            case VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE: make_image(bound, spec); return;
+            case VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE:
+                make_image(bound, spec);
+                return;
             case VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER:
                 make_image(bound, spec);
                 make_sampler(bound, spec, bound.format.component == Type::Kind::Float);
                 return;
-            default: throw Error("this kind of descriptor is not supported by rtc-run");
+            default:
+                throw Error("this kind of descriptor is not supported by rtc-run");
         }
     }
 
     TexelFormat format_of(const Resource& resource, const Json& spec) const {
-        if (spec.is_object() && spec.contains("format")) return texel_format(spec["format"].get<std::string>());
+        if (spec.is_object() && spec.contains("format"))
+            return texel_format(spec["format"].get<std::string>());
         return texel_format_of(resource.image.format, resource.image.component);
     }
 
@@ -229,27 +252,30 @@ class Session {
         std::string filter = spec.is_object() ? spec.value("filter", "linear") : "linear";
         std::string mode = spec.is_object() ? spec.value("address", "repeat") : "repeat";
         VkSamplerCreateInfo info{VK_STRUCTURE_TYPE_SAMPLER_CREATE_INFO};
-        info.magFilter = info.minFilter = filter == "linear" && filterable ? VK_FILTER_LINEAR : VK_FILTER_NEAREST;
+        info.magFilter = info.minFilter =
+            filter == "linear" && filterable ? VK_FILTER_LINEAR : VK_FILTER_NEAREST;
         if (filter != "linear" && filter != "nearest") throw Error("filter is linear or nearest");
         VkSamplerAddressMode address = mode == "repeat"   ? VK_SAMPLER_ADDRESS_MODE_REPEAT
                                        : mode == "clamp"  ? VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE
                                        : mode == "mirror" ? VK_SAMPLER_ADDRESS_MODE_MIRRORED_REPEAT
                                        : mode == "border" ? VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_BORDER
                                                           : VK_SAMPLER_ADDRESS_MODE_MAX_ENUM;
-        if (address == VK_SAMPLER_ADDRESS_MODE_MAX_ENUM) throw Error("address is repeat, clamp, mirror or border");
+        if (address == VK_SAMPLER_ADDRESS_MODE_MAX_ENUM)
+            throw Error("address is repeat, clamp, mirror or border");
         info.addressModeU = info.addressModeV = info.addressModeW = address;
-        info.borderColor = filterable ? VK_BORDER_COLOR_FLOAT_TRANSPARENT_BLACK : VK_BORDER_COLOR_INT_TRANSPARENT_BLACK;
+        info.borderColor =
+            filterable ? VK_BORDER_COLOR_FLOAT_TRANSPARENT_BLACK : VK_BORDER_COLOR_INT_TRANSPARENT_BLACK;
         check(vkCreateSampler(context_.device, &info, nullptr, &bound.sampler), "vkCreateSampler");
     }
 
     void make_image(Bound& bound, const Json& spec) {
         const Resource& resource = *bound.resource;
         bool storage = resource.type == VK_DESCRIPTOR_TYPE_STORAGE_IMAGE;
-        bound.format = storage ? format_of(resource, spec)
-                       : spec.is_object() && spec.contains("format")
-                           ? texel_format(spec["format"].get<std::string>())
-                       : resource.image.component == Type::Kind::Float ? texel_format("rgba8")
-                                                                       : texel_format_of(0, resource.image.component);
+        bound.format =
+            storage                                         ? format_of(resource, spec)
+            : spec.is_object() && spec.contains("format")   ? texel_format(spec["format"].get<std::string>())
+            : resource.image.component == Type::Kind::Float ? texel_format("rgba8")
+                                                            : texel_format_of(0, resource.image.component);
         tools::ImageDesc desc;
         desc.view_type = view_type(resource.image);
         desc.format = bound.format.format;
@@ -292,10 +318,12 @@ class Session {
                         bound.format.channels * bound.format.channel_bytes;
         if (texels.empty()) return;
         if (from_file && texels.size() < needed)  // the same picture in every layer
-            while (texels.size() < needed) texels.insert(texels.end(), texels.begin(), texels.begin() + long(std::min(texels.size(), needed - texels.size())));
+            while (texels.size() < needed)
+                texels.insert(texels.end(), texels.begin(),
+                              texels.begin() + long(std::min(texels.size(), needed - texels.size())));
         if (texels.size() != needed)
-            throw Error("the image takes " + std::to_string(needed) + " bytes, " + std::to_string(texels.size()) +
-                        " were given");
+            throw Error("the image takes " + std::to_string(needed) + " bytes, " +
+                        std::to_string(texels.size()) + " were given");
         tools::upload_image(context_, *bound.image, texels);
     }
 
@@ -306,7 +334,8 @@ class Session {
                 if (bound.resource->acceleration_structure) return executor_.top_address(bound.top);
                 if (bound.buffer && bound.buffer->address) return bound.buffer->address;
             }
-        throw Error("the address of binding " + text + " is not to be had: no buffer of that name, or the device has "
+        throw Error("the address of binding " + text +
+                    " is not to be had: no buffer of that name, or the device has "
                     "no bufferDeviceAddress");
     }
 
@@ -333,17 +362,20 @@ class Session {
                     std::vector<double> values;
                     for (const Json& value : spec["values"]) values.push_back(value.get<double>());
                     bytes = encode_texels(values, bound.format);
-                } else if (bound.resource->block && !(spec.is_object() && spec.contains("size") && spec.size() == 1)) {
+                } else if (bound.resource->block &&
+                           !(spec.is_object() && spec.contains("size") && spec.size() == 1)) {
                     Json members = spec;
                     if (members.is_object() && bound.resource->block->members.size() &&
-                        std::none_of(bound.resource->block->members.begin(), bound.resource->block->members.end(),
+                        std::none_of(bound.resource->block->members.begin(),
+                                     bound.resource->block->members.end(),
                                      [](const auto& m) { return m.name == "size"; }))
                         members.erase("size");
                     bytes.resize(size);
                     write_typed(*bound.resource->block, members, bytes, 0, address);
                 }
                 if (bytes.size() > size)
-                    throw Error(std::to_string(bytes.size()) + " bytes for a buffer of " + std::to_string(size));
+                    throw Error(std::to_string(bytes.size()) + " bytes for a buffer of " +
+                                std::to_string(size));
                 if (!bytes.empty()) std::memcpy(mapped, bytes.data(), bytes.size());
             } catch (const Json::exception& e) {
                 throw Error("binding " + slot_name(bound.slot) + ": " + e.what());
@@ -439,7 +471,8 @@ class Session {
             buffer = {bound.buffer->handle, 0, VK_WHOLE_SIZE};
             write.pBufferInfo = &buffer;
         } else {
-            image = {bound.sampler, bound.image ? bound.image->view : VK_NULL_HANDLE, VK_IMAGE_LAYOUT_GENERAL};
+            image = {bound.sampler, bound.image ? bound.image->view : VK_NULL_HANDLE,
+                     VK_IMAGE_LAYOUT_GENERAL};
             write.pImageInfo = &image;
         }
         vkUpdateDescriptorSets(context_.device, 1, &write, 0, nullptr);
@@ -490,9 +523,10 @@ std::map<Slot, Resource> merge_resources(const Job& job) {
                 continue;
             }
             Resource& known = at->second;
-            if (known.acceleration_structure != resource.acceleration_structure || known.type != resource.type)
-                throw Error("binding " + slot_name(slot) + " is " + type_name(known) + " in " + owner[slot] + " and " +
-                            type_name(resource) + " in " + job.sources[i].name);
+            if (known.acceleration_structure != resource.acceleration_structure ||
+                known.type != resource.type)
+                throw Error("binding " + slot_name(slot) + " is " + type_name(known) + " in " + owner[slot] +
+                            " and " + type_name(resource) + " in " + job.sources[i].name);
             known.writable |= resource.writable;
             known.count = known.count && resource.count ? std::max(known.count, resource.count) : 0;
             if (resource.block && known.block && resource.block->size() > known.block->size())

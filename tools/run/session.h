@@ -30,7 +30,8 @@ struct RunResult {
 constexpr uint32_t kNullTop = ~0u;  // for Executor::write_top: a null acceleration structure
 
 // The compiled job (see compile()) on a fresh executor.
-RunResult run_job(const native::Context& context, native::Executor& executor, const Job& job, unsigned repeats = 1);
+RunResult run_job(const native::Context& context, native::Executor& executor, const Job& job,
+                  unsigned repeats = 1);
 
 // All resources of all stages by slot; throws where two stages disagree about a descriptor's type.
 std::map<Slot, Resource> merge_resources(const Job& job);

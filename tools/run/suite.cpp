@@ -42,7 +42,8 @@ std::vector<std::string> find_cases(const std::string& folder, const std::string
     for (const auto& entry : std::filesystem::recursive_directory_iterator(root))
         if (entry.path().extension() == ".json" && entry.path().filename().string()[0] != '_') {
             std::string relative = std::filesystem::relative(entry.path(), root).string();
-            if (filter.empty() || relative.find(filter) != std::string::npos) files.push_back(entry.path().string());
+            if (filter.empty() || relative.find(filter) != std::string::npos)
+                files.push_back(entry.path().string());
         }
     std::sort(files.begin(), files.end());
     return files;
@@ -60,15 +61,14 @@ bool applies(const Job& job, const Variant& variant, std::string& skip) {
     // A case written in EXT has no NV twin; SPIR-V cannot be rewritten.
     if (variant.dialect == Dialect::AsWritten && !written_nv && written_ext && !binary) return false;
     if (variant.dialect == Dialect::Ext && binary && written_nv) return false;
-    if (!job.only.empty() && std::none_of(job.only.begin(), job.only.end(), [&](const std::string& attribute) {
-            return variant.attributes.count(attribute);
-        }))
+    if (!job.only.empty() &&
+        std::none_of(job.only.begin(), job.only.end(),
+                     [&](const std::string& attribute) { return variant.attributes.count(attribute); }))
         return false;
     for (const auto& [attribute, reason] : job.skip)
         if (variant.attributes.count(attribute)) skip = reason;
     return true;
 }
-
 
 std::string oracle_path(const std::string& folder, const Job& job) {
     std::string name = job.name;
@@ -89,15 +89,15 @@ RunResult load_oracle(const std::string& path, const RunResult& shape) {
     RunResult result = shape;
     size_t at = 0;
     for (Output& output : result.outputs) {
-        if (at + output.bytes.size() > bytes.size()) throw Error(path + ": recorded for another version of the case");
+        if (at + output.bytes.size() > bytes.size())
+            throw Error(path + ": recorded for another version of the case");
         std::copy_n(bytes.begin() + long(at), output.bytes.size(), output.bytes.begin());
         at += output.bytes.size();
     }
     return result;
 }
 
-Outcome run_one(const Task& task, const SuiteOptions& options,
-                const std::function<Host&(Backend)>& host_of) {
+Outcome run_one(const Task& task, const SuiteOptions& options, const std::function<Host&(Backend)>& host_of) {
     Outcome outcome;
     auto start = std::chrono::steady_clock::now();
     try {
@@ -146,7 +146,8 @@ Outcome run_one(const Task& task, const SuiteOptions& options,
         std::string got = result.launch_error.substr(0, result.launch_error.find(':'));
         if (variant.backend == Backend::Rtc && got != job.launch_error) {
             outcome.kind = Outcome::Kind::Failed;
-            outcome.detail = "launch error '" + result.launch_error + "', expected '" + job.launch_error + "'";
+            outcome.detail =
+                "launch error '" + result.launch_error + "', expected '" + job.launch_error + "'";
         }
         const auto& messages = host.context().validation_messages();
         if (messages.size() > said) {
@@ -170,8 +171,12 @@ Outcome run_one(const Task& task, const SuiteOptions& options,
 Json to_json(size_t index, const Outcome& outcome) {
     Json cells = Json::array();
     for (const CellResult& cell : outcome.cells)
-        cells.push_back({{"cell", cell.cell}, {"passed", cell.passed}, {"detail", cell.detail}, {"known", cell.known}});
-    return {{"index", index}, {"kind", int(outcome.kind)}, {"detail", outcome.detail}, {"cells", cells},
+        cells.push_back(
+            {{"cell", cell.cell}, {"passed", cell.passed}, {"detail", cell.detail}, {"known", cell.known}});
+    return {{"index", index},
+            {"kind", int(outcome.kind)},
+            {"detail", outcome.detail},
+            {"cells", cells},
             {"seconds", outcome.seconds}};
 }
 
@@ -192,7 +197,8 @@ Json to_json(size_t index, const Outcome& outcome) {
     for (size_t i = first; i < tasks.size(); ++i) {
         std::string line = "{\"start\": " + std::to_string(i) + "}\n";
         if (write(out, line.data(), line.size()) < 0) _exit(3);
-        line = to_json(i, run_one(tasks[i], options, host_of)).dump(-1, ' ', false, Json::error_handler_t::replace) +
+        line = to_json(i, run_one(tasks[i], options, host_of))
+                   .dump(-1, ' ', false, Json::error_handler_t::replace) +
                "\n";
         for (size_t at = 0; at < line.size();) {
             ssize_t wrote = write(out, line.data() + at, line.size() - at);
@@ -218,7 +224,8 @@ int run_suite(const SuiteOptions& options) {
     if (options.host.print_device) {
         Host::Options only = options.host;
         only.validate = false;
-        // The device is opened in a child too: some drivers do not survive a fork of a process that holds them.
+        // The device is opened in a child too: some drivers do not survive a fork of a process that holds
+        // them.
         std::fflush(stdout);
         pid_t pid = fork();
         if (pid == 0) {
@@ -227,7 +234,8 @@ int run_suite(const SuiteOptions& options) {
                 std::set<Backend> backends;
                 if (options.compare) backends.insert(Backend::Khr);
                 for (const std::string& variant : options.variants)
-                    if (variant_of(variant).backend != Backend::Rtc) backends.insert(variant_of(variant).backend);
+                    if (variant_of(variant).backend != Backend::Rtc)
+                        backends.insert(variant_of(variant).backend);
                 Host host(backends, only);
             } catch (const std::exception& e) {
                 std::fprintf(stderr, "rtc-run: error: %s\n", e.what());
@@ -270,7 +278,8 @@ int run_suite(const SuiteOptions& options) {
             ssize_t got = read(ends[0], chunk, sizeof(chunk));
             if (got <= 0) break;
             text.append(chunk, size_t(got));
-            for (size_t newline; (newline = text.find('\n')) != std::string::npos; text.erase(0, newline + 1)) {
+            for (size_t newline; (newline = text.find('\n')) != std::string::npos;
+                 text.erase(0, newline + 1)) {
                 Json line = Json::parse(text.substr(0, newline));
                 if (line.contains("start")) {
                     running = line["start"].get<size_t>();
@@ -283,7 +292,8 @@ int run_suite(const SuiteOptions& options) {
                 outcome.seconds = line["seconds"].get<double>();
                 for (const Json& cell : line["cells"])
                     outcome.cells.push_back({cell["cell"].get<std::string>(), cell["passed"].get<bool>(),
-                                             cell["detail"].get<std::string>(), cell["known"].get<std::string>()});
+                                             cell["detail"].get<std::string>(),
+                                             cell["known"].get<std::string>()});
                 done[index] = true;
                 running = index + 1;
                 if (outcome.kind == Outcome::Kind::Failed || options.verbose)
@@ -293,8 +303,8 @@ int run_suite(const SuiteOptions& options) {
                                 : outcome.kind == Outcome::Kind::Passed  ? "pass"
                                                                          : "n/a ",
                                 std::filesystem::relative(tasks[index].file, options.folder).c_str(),
-                                tasks[index].variant.c_str(), outcome.seconds, outcome.detail.empty() ? "" : "\n     ",
-                                outcome.detail.c_str());
+                                tasks[index].variant.c_str(), outcome.seconds,
+                                outcome.detail.empty() ? "" : "\n     ", outcome.detail.c_str());
                 std::fflush(stdout);
             }
         }

@@ -122,7 +122,8 @@ Bytes sequence(const Json& value, const AddressOf& address) {
             for (const Json& inner : item) add(inner);
             return;
         }
-        if (!item.is_object()) throw Error("a typed value like {\"u32\": 1} was expected, not " + item.dump());
+        if (!item.is_object())
+            throw Error("a typed value like {\"u32\": 1} was expected, not " + item.dump());
         for (const auto& [key, content] : item.items()) {
             Scalar scalar;
             if (key == "align") {
@@ -134,14 +135,16 @@ Bytes sequence(const Json& value, const AddressOf& address) {
                 put(bytes, bytes.size(), address(content.get<std::string>()), 8);
             } else if (scalar_of(key, scalar)) {
                 auto one = [&](const Json& number) {
-                    put(bytes, bytes.size(), number_bits(number, scalar.kind, scalar.width), scalar.width / 8);
+                    put(bytes, bytes.size(), number_bits(number, scalar.kind, scalar.width),
+                        scalar.width / 8);
                 };
                 if (content.is_array())
                     for (const Json& number : content) one(number);
                 else
                     one(content);
             } else {
-                throw Error("unknown value type '" + key + "' (u8 i8 u16 i16 u32 i32 u64 i64 f16 f32 f64, address, "
+                throw Error("unknown value type '" + key +
+                            "' (u8 i8 u16 i16 u32 i32 u64 i64 f16 f32 f64, address, "
                             "align, skip)");
             }
         }
@@ -159,9 +162,10 @@ void write_typed(const Type& type, const Json& value, Bytes& bytes, size_t offse
             put(bytes, offset, number_bits(value, type.kind, type.width), type.size());
             return;
         case Type::Kind::Address:
-            put(bytes, offset, value.is_string() && value.get<std::string>().find('.') != std::string::npos
-                                   ? address(value.get<std::string>())
-                                   : number_bits(value, Type::Kind::Uint, 64),
+            put(bytes, offset,
+                value.is_string() && value.get<std::string>().find('.') != std::string::npos
+                    ? address(value.get<std::string>())
+                    : number_bits(value, Type::Kind::Uint, 64),
                 8);
             return;
         case Type::Kind::Vector:
@@ -172,7 +176,8 @@ void write_typed(const Type& type, const Json& value, Bytes& bytes, size_t offse
                 return;
             }
             if (type.count && value.size() > type.count)
-                throw Error(std::to_string(value.size()) + " values for " + std::to_string(type.count) + " elements");
+                throw Error(std::to_string(value.size()) + " values for " + std::to_string(type.count) +
+                            " elements");
             for (size_t i = 0; i < value.size(); ++i)
                 write_typed(*type.element, value[i], bytes, offset + i * type.stride, address);
             return;
@@ -191,9 +196,11 @@ void write_typed(const Type& type, const Json& value, Bytes& bytes, size_t offse
         }
         case Type::Kind::Struct:
             if (value.is_array()) {
-                if (value.size() > type.members.size()) throw Error("more values than members: " + value.dump());
+                if (value.size() > type.members.size())
+                    throw Error("more values than members: " + value.dump());
                 for (size_t i = 0; i < value.size(); ++i)
-                    write_typed(*type.members[i].type, value[i], bytes, offset + type.members[i].offset, address);
+                    write_typed(*type.members[i].type, value[i], bytes, offset + type.members[i].offset,
+                                address);
                 return;
             }
             if (!value.is_object()) throw Error("an object of members was expected, not " + value.dump());
@@ -208,14 +215,16 @@ void write_typed(const Type& type, const Json& value, Bytes& bytes, size_t offse
                 write_typed(*found->type, inner, bytes, offset + found->offset, address);
             }
             return;
-        case Type::Kind::Opaque: throw Error("a value cannot be given for an opaque type");
+        case Type::Kind::Opaque:
+            throw Error("a value cannot be given for an opaque type");
     }
 }
 
 Json read_typed(const Type& type, const uint8_t* bytes, size_t size) {
     if (type.kind != Type::Kind::Array && type.size() > size) return nullptr;
     switch (type.kind) {
-        case Type::Kind::Bool: return bytes[0] != 0;
+        case Type::Kind::Bool:
+            return bytes[0] != 0;
         case Type::Kind::Int: {
             int64_t value = 0;
             std::memcpy(&value, bytes, type.width / 8);
@@ -257,10 +266,11 @@ Json read_typed(const Type& type, const uint8_t* bytes, size_t size) {
             for (uint32_t c = 0; c < type.count; ++c) {
                 Json values = Json::array();
                 for (uint32_t r = 0; r < column.count; ++r)
-                    values.push_back(read_typed(*column.element,
-                                                bytes + (type.row_major ? r * type.stride + c * column.stride
-                                                                        : c * type.stride + r * column.stride),
-                                                8));
+                    values.push_back(
+                        read_typed(*column.element,
+                                   bytes + (type.row_major ? r * type.stride + c * column.stride
+                                                           : c * type.stride + r * column.stride),
+                                   8));
                 out.push_back(std::move(values));
             }
             return out;
@@ -276,7 +286,8 @@ Json read_typed(const Type& type, const uint8_t* bytes, size_t size) {
             }
             return out;
         }
-        case Type::Kind::Opaque: break;
+        case Type::Kind::Opaque:
+            break;
     }
     return nullptr;
 }
@@ -344,29 +355,49 @@ TexelFormat texel_format(const std::string& name) {
 
 TexelFormat texel_format_of(uint32_t format, Type::Kind component) {
     switch (format) {
-        case spv::ImageFormatRgba32f: return texel_format("rgba32f");
-        case spv::ImageFormatRg32f: return texel_format("rg32f");
-        case spv::ImageFormatR32f: return texel_format("r32f");
-        case spv::ImageFormatRgba16f: return texel_format("rgba16f");
-        case spv::ImageFormatRg16f: return texel_format("rg16f");
-        case spv::ImageFormatR16f: return texel_format("r16f");
-        case spv::ImageFormatRgba8: return texel_format("rgba8");
-        case spv::ImageFormatRg8: return texel_format("rg8");
-        case spv::ImageFormatR8: return texel_format("r8");
-        case spv::ImageFormatRgba16: return texel_format("rgba16");
-        case spv::ImageFormatRgba32ui: return texel_format("rgba32ui");
-        case spv::ImageFormatRg32ui: return texel_format("rg32ui");
-        case spv::ImageFormatR32ui: return texel_format("r32ui");
-        case spv::ImageFormatRgba16ui: return texel_format("rgba16ui");
-        case spv::ImageFormatRgba8ui: return texel_format("rgba8ui");
-        case spv::ImageFormatR8ui: return texel_format("r8ui");
-        case spv::ImageFormatRgba32i: return texel_format("rgba32i");
-        case spv::ImageFormatR32i: return texel_format("r32i");
+        case spv::ImageFormatRgba32f:
+            return texel_format("rgba32f");
+        case spv::ImageFormatRg32f:
+            return texel_format("rg32f");
+        case spv::ImageFormatR32f:
+            return texel_format("r32f");
+        case spv::ImageFormatRgba16f:
+            return texel_format("rgba16f");
+        case spv::ImageFormatRg16f:
+            return texel_format("rg16f");
+        case spv::ImageFormatR16f:
+            return texel_format("r16f");
+        case spv::ImageFormatRgba8:
+            return texel_format("rgba8");
+        case spv::ImageFormatRg8:
+            return texel_format("rg8");
+        case spv::ImageFormatR8:
+            return texel_format("r8");
+        case spv::ImageFormatRgba16:
+            return texel_format("rgba16");
+        case spv::ImageFormatRgba32ui:
+            return texel_format("rgba32ui");
+        case spv::ImageFormatRg32ui:
+            return texel_format("rg32ui");
+        case spv::ImageFormatR32ui:
+            return texel_format("r32ui");
+        case spv::ImageFormatRgba16ui:
+            return texel_format("rgba16ui");
+        case spv::ImageFormatRgba8ui:
+            return texel_format("rgba8ui");
+        case spv::ImageFormatR8ui:
+            return texel_format("r8ui");
+        case spv::ImageFormatRgba32i:
+            return texel_format("rgba32i");
+        case spv::ImageFormatR32i:
+            return texel_format("r32i");
         case spv::ImageFormatUnknown:
             return component == Type::Kind::Uint  ? texel_format("rgba32ui")
                    : component == Type::Kind::Int ? texel_format("rgba32i")
                                                   : texel_format("rgba32f");
-        default: throw Error("image format " + std::to_string(format) + " of a shader is not supported by rtc-run");
+        default:
+            throw Error("image format " + std::to_string(format) +
+                        " of a shader is not supported by rtc-run");
     }
 }
 
@@ -406,7 +437,8 @@ Bytes image_pattern(const std::string& name, const TexelFormat& format, VkExtent
         for (uint32_t z = 0; z < extent.depth; ++z)
             for (uint32_t y = 0; y < extent.height; ++y)
                 for (uint32_t x = 0; x < extent.width; ++x, ++index) {
-                    double u = (x + 0.5) / extent.width, v = (y + 0.5) / extent.height, w = (z + 0.5) / extent.depth;
+                    double u = (x + 0.5) / extent.width, v = (y + 0.5) / extent.height,
+                           w = (z + 0.5) / extent.depth;
                     double texel[4] = {0, 0, 0, 1};
                     if (name == "checker") {
                         bool on = ((x * 8 / extent.width) + (y * 8 / extent.height) + z + layer) & 1;

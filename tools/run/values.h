@@ -43,7 +43,7 @@ struct TexelFormat {
     uint32_t channels, channel_bytes;
     bool normalized;
 };
-TexelFormat texel_format(const std::string& name);           // "rgba8", "r32ui", ...
+TexelFormat texel_format(const std::string& name);  // "rgba8", "r32ui", ...
 TexelFormat texel_format_of(uint32_t spirv_image_format, Type::Kind component);
 // "checker", "gradient", "uv", "noise", "white", "black", "grey", "index"
 Bytes image_pattern(const std::string& name, const TexelFormat& format, VkExtent3D extent, uint32_t layers);
