@@ -60,7 +60,9 @@
 extern "C" {
 #endif
 
-/* ---- Enumerations ------------------------------------------------------------ */
+/* ---- Enumerations ------------------------------------------------------------
+ * The *_MAX_ENUM values only make every int a value of its type: one outside the list
+ * is answered with RTCC_STATUS_INVALID_ARGUMENT. */
 
 typedef enum rtcc_status {
     RTCC_STATUS_SUCCESS = 0,
@@ -89,7 +91,8 @@ typedef enum rtcc_stage {
 typedef enum rtcc_group_kind {
     RTCC_GROUP_KIND_GENERAL = 0,
     RTCC_GROUP_KIND_TRIANGLES = 1,
-    RTCC_GROUP_KIND_PROCEDURAL = 2
+    RTCC_GROUP_KIND_PROCEDURAL = 2,
+    RTCC_GROUP_KIND_MAX_ENUM = 0x7fffffff
 } rtcc_group_kind;
 
 typedef enum rtcc_severity { RTCC_SEVERITY_WARNING = 0, RTCC_SEVERITY_ERROR = 1 } rtcc_severity;
@@ -98,13 +101,15 @@ typedef enum rtcc_target_env {
     RTCC_TARGET_AUTO = 0, /* vulkan1.1, or 1.2 when a stage needs it */
     RTCC_TARGET_VULKAN_1_1 = 1,
     RTCC_TARGET_VULKAN_1_2 = 2,
-    RTCC_TARGET_VULKAN_1_3 = 3
+    RTCC_TARGET_VULKAN_1_3 = 3,
+    RTCC_TARGET_MAX_ENUM = 0x7fffffff
 } rtcc_target_env;
 
 typedef enum rtcc_optimization {
     RTCC_OPTIMIZATION_NONE = 0,
     RTCC_OPTIMIZATION_PERFORMANCE = 1,
-    RTCC_OPTIMIZATION_SIZE = 2
+    RTCC_OPTIMIZATION_SIZE = 2,
+    RTCC_OPTIMIZATION_MAX_ENUM = 0x7fffffff
 } rtcc_optimization;
 
 typedef struct rtcc_compiler* rtcc_compiler_t;
@@ -237,12 +242,14 @@ RTCC_EXPORT int32_t rtcc_pipeline_add_hit_group(rtcc_pipeline_t pipeline, const 
 /* Options may be NULL in all of them. */
 
 /* The whole journey: every stage to SPIR-V, then all into one compute module. */
-RTCC_EXPORT rtcc_result_t rtcc_compile_pipeline(rtcc_const_compiler_t compiler, rtcc_const_pipeline_t pipeline,
+RTCC_EXPORT rtcc_result_t rtcc_compile_pipeline(rtcc_const_compiler_t compiler,
+                                                rtcc_const_pipeline_t pipeline,
                                                 rtcc_const_options_t options);
 /* One GLSL stage to SPIR-V, not linked: NV sources to SPIR-V 1.3 (Vulkan 1.1), EXT
  * sources to 1.4 (Vulkan 1.2). */
-RTCC_EXPORT rtcc_result_t rtcc_compile_stage(rtcc_const_compiler_t compiler, rtcc_stage stage, const char* file,
-                                             const char* source, size_t source_size, rtcc_const_options_t options);
+RTCC_EXPORT rtcc_result_t rtcc_compile_stage(rtcc_const_compiler_t compiler, rtcc_stage stage,
+                                             const char* file, const char* source, size_t source_size,
+                                             rtcc_const_options_t options);
 /* One GLSL stage through the preprocessor; the text is rtcc_result_text. */
 RTCC_EXPORT rtcc_result_t rtcc_preprocess_stage(rtcc_const_compiler_t compiler, rtcc_stage stage,
                                                 const char* file, const char* source, size_t source_size,
