@@ -234,7 +234,7 @@ static VkResult check_build(RtrBuild* b, const VkAccelerationStructureInfoNV* in
             if (r != VK_SUCCESS) return r;
             rtr_check_geometry(d, &dst->geometries[g], g, &made);
             if (info->pGeometries[g].geometryType != dst->geometries[g].geometryType || n > made ||
-                (update && (n != made || info->pGeometries[g].flags != dst->geometries[g].flags)))
+                (update && info->pGeometries[g].flags != dst->geometries[g].flags))
                 return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "as-geometry",
                                  "geometry %u: type, flags or count (%u) do not fit its creation (%u)", g, n,
                                  made);

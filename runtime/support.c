@@ -104,7 +104,7 @@ VkResult rtrGetPhysicalDeviceSupport(VkInstance instance, VkPhysicalDevice physi
             (format.bufferFeatures & VK_FORMAT_FEATURE_UNIFORM_TEXEL_BUFFER_BIT) ? 1 : 0);
 
     pSupport->heapMode = VK_TRUE;
-    texels = l->maxTexelBufferElements;
+    texels = l->maxTexelBufferElements < 0x7fffffffu ? l->maxTexelBufferElements : 0x7fffffffu; /* ints */
     storage = l->maxStorageBufferRange;
     pSupport->maxHeapSizeTexel = texels * RTC_QUAD_BYTES;
     pSupport->maxHeapSizeStorage = storage / 256 * 256;

@@ -173,6 +173,33 @@ TEST_F(CopyTest, RefitOfInstancesAndBoxes) {
     EXPECT_LE(lo[2], -10);
 }
 
+// A structure may be built, and then updated, with less than it was created for.
+TEST_F(CopyTest, FewerThanCreatedFor) {
+    Scene scene(*vk, rtr, 1 << 20);
+    const auto flags = VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV;
+    auto vertices = ball(100, 1, 1);
+    std::vector<VkGeometryNV> geometry{scene.triangles(vertices)};
+    VkAccelerationStructureInfoNV info{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV};
+    info.type = VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_NV;
+    info.flags = flags;
+    info.geometryCount = 1;
+    info.pGeometries = geometry.data();
+    auto as = scene.create(info);
+    Buffer scratch = vk->buffer(scene.scratch_size(as), RTR_SCRATCH_BUFFER_USAGE);
+    geometry[0].geometry.triangles.vertexCount = 60;
+    for (VkBool32 update : {VK_FALSE, VK_TRUE}) {
+        scene.run([&] {
+            EXPECT_EQ(rtrCmdBuildAccelerationStructure(scene.recorder, &info, VK_NULL_HANDLE, 0, update, as,
+                                                       nullptr, scratch.handle, 0),
+                      VK_SUCCESS);
+        });
+        TreeFacts facts;
+        check_structure(scene, as, facts);
+        EXPECT_EQ(facts.slots.size(), 20u);
+    }
+    vk->destroy(scratch);
+}
+
 TEST_F(CopyTest, WrongUsesAreNamed) {
     Scene scene(*vk, rtr, 1 << 20);
     auto vertices = ball(10, 1, 1);
