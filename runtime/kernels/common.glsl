@@ -30,7 +30,8 @@ layout(set = 1, binding = RTR_ARR_DST_HEADER, std430) buffer DstHeader { uint ds
 
 layout(local_size_x = 256, local_size_y = 1, local_size_z = 1) in;
 
-// llvmpipe compiles a memory barrier like a control barrier: a workgroup whose lanes do
+// llvmpipe of Mesa 22.3 compiles a memory barrier like a control barrier (25 no longer
+// does, tried with this very kernel): a workgroup whose lanes do
 // not all reach it stops there for good. Its atomics are sequentially consistent, so it
 // needs no fence around them and gets none.
 layout(constant_id = 0) const bool RTR_FENCES = true;
