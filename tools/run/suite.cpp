@@ -312,14 +312,17 @@ int run_suite(const SuiteOptions& options) {
         int status = 0;
         waitpid(pid, &status, 0);
         if (running >= tasks.size()) break;
-        // It died in `running`.
+        // It died in `running`. A native driver that cannot finish (lavapipe 25 takes minutes to compile some
+        // loops around traces) says nothing about rtc: that is a skip with its reason.
         Outcome& outcome = outcomes[running];
-        outcome.kind = Outcome::Kind::Failed;
+        bool native = variant_of(tasks[running].variant).backend != Backend::Rtc;
+        outcome.kind = timed_out && native ? Outcome::Kind::Skipped : Outcome::Kind::Failed;
         outcome.detail = timed_out ? "no answer within " + std::to_string(options.timeout_seconds) + " s"
-                         : WIFSIGNALED(status) ? std::string("crashed: ") + strsignal(WTERMSIG(status))
-                                               : "ended with status " + std::to_string(WEXITSTATUS(status));
-        outcome.cells = {{"case", false, outcome.detail, ""}};
-        std::printf("FAIL %s [%s]\n     %s\n",
+                         : WIFSIGNALED(status)
+                             ? std::string("crashed: ") + strsignal(WTERMSIG(status))
+                             : "ended with status " + std::to_string(WEXITSTATUS(status));
+        if (outcome.kind == Outcome::Kind::Failed) outcome.cells = {{"case", false, outcome.detail, ""}};
+        std::printf("%s %s [%s]\n     %s\n", outcome.kind == Outcome::Kind::Failed ? "FAIL" : "skip",
                     std::filesystem::relative(tasks[running].file, options.folder).c_str(),
                     tasks[running].variant.c_str(), outcome.detail.c_str());
         next = running + 1;
