@@ -85,6 +85,11 @@ Picture read_pfm(const std::string& path) {
 
 }  // namespace
 
+bool can_write_picture(const std::string& path) {
+    const std::string extension = extension_of(path);
+    return extension == ".png" || extension == ".pfm" || extension == ".exr";
+}
+
 void write_picture(const std::string& path, const Picture& picture, bool srgb) {
     const std::string extension = extension_of(path);
     if (extension == ".png") {

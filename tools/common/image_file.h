@@ -19,6 +19,8 @@ struct Picture {
     const float* at(uint32_t x, uint32_t y) const { return &pixels[(size_t(y) * width + x) * channels]; }
 };
 
+// Whether write_picture knows the extension; asked before hours of work.
+bool can_write_picture(const std::string& path);
 // The extension chooses: .png (clamped, sRGB curve; `srgb` false writes values * 255 as they are),
 // .pfm (1 or 3 channels; a fourth is dropped), .exr (32-bit floats). Throws Error.
 void write_picture(const std::string& path, const Picture& picture, bool srgb = true);

@@ -62,6 +62,13 @@ const char* fetch_name(RtrFetch fetch) {
 }
 std::string mebibytes(VkDeviceSize bytes) { return std::to_string(bytes >> 20) + " MiB"; }
 
+// Versions are packed into the number; everything else is a plain limit.
+std::string limit_text(const RtrRequirement& requirement, uint64_t value) {
+    if (std::strcmp(requirement.name, "apiVersion") != 0) return std::to_string(value);
+    return std::to_string(VK_API_VERSION_MAJOR(value)) + "." + std::to_string(VK_API_VERSION_MINOR(value)) +
+           "." + std::to_string(VK_API_VERSION_PATCH(value));
+}
+
 std::string modes(const RtrPhysicalDeviceSupport& support) {
     if (!support.supported) return "none";
     std::string text = support.heapMode ? "heap" : "";
@@ -101,8 +108,9 @@ std::string as_text(const DeviceReport& report) {
     for (uint32_t i = 0; i < support.requirementCount; ++i) {
         const RtrRequirement& requirement = support.requirements[i];
         if (!requirement.met)
-            text << "  missing:              " << requirement.name << " " << requirement.required << " (has "
-                 << requirement.available << ")\n";
+            text << "  missing:              " << requirement.name << " "
+                 << limit_text(requirement, requirement.required) << " (has "
+                 << limit_text(requirement, requirement.available) << ")\n";
     }
     text << "  mode:                 " << modes(support) << "\n";
     text << "  native ray tracing:   ";
@@ -129,8 +137,9 @@ std::string as_text(const DeviceReport& report) {
     text << "  limits:               ";
     for (uint32_t i = 0; i < support.requirementCount; ++i) {
         const RtrRequirement& requirement = support.requirements[i];
-        text << (i ? "                        " : "") << requirement.name << " " << requirement.available
-             << " (needs " << requirement.required << ")\n";
+        text << (i ? "                        " : "") << requirement.name << " "
+             << limit_text(requirement, requirement.available) << " (needs "
+             << limit_text(requirement, requirement.required) << ")\n";
     }
     if (!report.probed) {
         text << "  float arithmetic:     not probed: " << report.probe_problem << "\n";

@@ -156,6 +156,8 @@ int main(int argc, char** argv) {
     return run_program("rtc-render", [&] {
         if (arguments.output.empty() && !arguments.demo && !arguments.compare)
             throw Error("-o FILE, --compare or --demo is needed");
+        if (!arguments.output.empty() && !can_write_picture(arguments.output))
+            throw Error(arguments.output + ": pictures are written as .png, .exr or .pfm");
         if (arguments.compare && arguments.native.empty()) throw Error("--compare needs --native=nv or khr");
         render.settings.integrator = integrator_from_name(arguments.integrator);
         render.settings.ext_dialect = arguments.dialect == "ext";

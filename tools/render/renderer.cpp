@@ -53,6 +53,13 @@ std::vector<std::vector<uint32_t>> get_modules(const RtcDevice& device, const Re
 RenderResult render(const RtcDevice& device, const Scene& scene, const RenderOptions& options) {
     const Context& context = device.context;
     RenderResult result;
+    for (const Material& material : scene.materials)
+        if (material.alpha_tested) {
+            std::fprintf(stderr,
+                         "rtc-render: warning: material '%s' has holes (alphaMode MASK); it is drawn solid\n",
+                         material.name.c_str());
+            break;
+        }
     RenderJob job(context, scene, options.settings);
     const std::vector<std::vector<uint32_t>> modules =
         get_modules(device, job, options, result.compile_seconds);
