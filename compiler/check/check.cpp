@@ -131,6 +131,9 @@ class Checker {
                 return;
             case Op::OpIgnoreIntersectionKHR: need_stage(inst, {K::AnyHit}, "ignoring an intersection"); return;
             case Op::OpTerminateRayKHR: need_stage(inst, {K::AnyHit}, "terminating a ray"); return;
+            case Op::OpVariable:
+                if (p_.type_op(p_.pointee(inst.type)) != Op::OpTypeRayQueryKHR) return;
+                [[fallthrough]];
             case Op::OpRayQueryInitializeKHR:
                 stage_.fail("ray-query-unsupported", inst.source, "ray queries are not supported yet", p_);
             case Op::OpControlBarrier:

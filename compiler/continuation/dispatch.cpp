@@ -86,7 +86,7 @@ Id Machine::entry_function(const std::string& region) {
                 good, [&] { code.e().store(result, word); },
                 [&] {
                     Emitter bad = code.e();
-                    call(bad, "rtc_error", {p.constant_u32(RTC_LAUNCH_ERROR_BAD_HANDLE), word, at});
+                    report(bad, RTC_LAUNCH_ERROR_BAD_HANDLE, word);
                 });
         });
     });
@@ -236,15 +236,14 @@ Function Machine::build_main(const std::vector<Function>& stage_functions) {
         e.store(state, e.select(u32, good, first, p.constant_u32(kStateDone)));
         code.branch(e.value(Op::OpLogicalNot, p.bool_type(), {good}), [&] {
             Emitter bad = code.e();
-            call(bad, "rtc_error", {p.constant_u32(RTC_LAUNCH_ERROR_BAD_HANDLE), first, p.constant_u32(0)});
+            report(bad, RTC_LAUNCH_ERROR_BAD_HANDLE, first);
         });
         Emitter init = code.e();
         for (Id variable : {record, depth, callable_depth, report_return, accepted}) init.store_u32(variable, 0);
         init.store(fresh, p.constant_bool(false));
         if (top) init.store_u32(top, 0);
     };
-    code.e().store_u32(push, 0);
-    code.e().store_u32(pop, 0);
+    for (Id variable : {push, pop, error}) code.e().store_u32(variable, 0);
     code.e().store(leave, p.constant_bool(false));
     if (resumable) {
         // Word RTC_PARAM_ROUND of the dispatch parameters.
@@ -323,6 +322,11 @@ Function Machine::build_main(const std::vector<Function>& stage_functions) {
         move_words(true);
         move_words(false);
     }
+    code.branch(code.not_equal(code.load(error), 0), [&] {
+        Emitter e = code.e();
+        call(e, "rtc_error", {e.load(u32, error), e.load(u32, error_detail), p.constant_u32(0)});
+        e.store_u32(error, 0);
+    });
     code.e().store(leave, p.constant_bool(false));
     const Id current = code.load(state);
     const Id running = p.module.new_id(), stop = p.module.new_id();

@@ -20,6 +20,8 @@ Machine::Machine(Program& program, const LinkOptions& link_options) : p(program)
     callable_depth = u32_variable("rtc_callable_depth");
     callable_ret = u32_variable("rtc_callable_return");
     record = p.add_variable(spv::StorageClass::Private, p.uint_type(), "rtc_record");
+    error = p.add_variable(spv::StorageClass::Private, p.uint_type(), "rtc_pending_error");
+    error_detail = p.add_variable(spv::StorageClass::Private, p.uint_type(), "rtc_pending_detail");
     dispatch = p.module.new_id();
     p.module.set_name(dispatch, "rtc_dispatch");
 }
@@ -201,6 +203,11 @@ Id Machine::load(Emitter& e, const std::string& name) const {
 }
 
 void Machine::store(Emitter& e, const std::string& name, Id value) const { e.store(variable(name), value); }
+
+void Machine::report(Emitter& e, uint32_t kind, Id detail) {
+    e.store_u32(error, kind);
+    e.store(error_detail, detail);
+}
 
 void Machine::go(Emitter& e, uint32_t id) { go_value(e, p.constant_u32(id)); }
 

@@ -68,6 +68,10 @@ class Machine {
     Id report_return = 0;  // state of an intersection shader waiting for its any-hit, or 0
     Id accepted = 0;     // uint: what that any-hit decided
     Id record = 0;       // Private: first word of the record of the shader being entered
+    // Private: a launch error found by a state, reported by the dispatcher. The report is a storage buffer
+    // access, and drivers pay for every place that holds one.
+    Id error = 0, error_detail = 0;
+    void report(Emitter& e, uint32_t kind, Id detail);
     Id callable_depth = 0;
     Id callable_ret = 0;  // as ret, for callables: they cannot trace, so the two never mix
     Id payload_word(uint32_t i) { return word(payload_words_, i, "payload"); }

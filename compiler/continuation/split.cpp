@@ -678,8 +678,7 @@ class Splitter {
         call(taken);
         begin_block(no);
         Emitter dropped = emitter();
-        if (error)
-            m_.call(dropped, "rtc_error", {p_.constant_u32(error), detail, p_.constant_u32(0)});
+        if (error) m_.report(dropped, error, detail);
         m_.go(dropped, resume);
         begin_block(merge);
         emitter().effect(Op::OpUnreachable, {});

@@ -247,6 +247,12 @@ class Reader {
         if (groups_.empty()) return;
         std::vector<Inst> kept;
         std::multimap<Id, Inst> by_group;
+        // Groups multiply: uses times decorations. No real module comes near this.
+        constexpr size_t kMaxDecorations = 1000000;
+        auto keep = [&](Inst copy) {
+            if (kept.size() >= kMaxDecorations) malformed("decoration groups expand to over a million decorations");
+            kept.push_back(std::move(copy));
+        };
         for (Inst& inst : module_.decorations) {
             if (inst.op == Op::OpDecorate && groups_.count(inst.ops[0]))
                 by_group.emplace(inst.ops[0], std::move(inst));
@@ -260,7 +266,7 @@ class Reader {
                     for (size_t i = 1; i < use.ops.size(); ++i) {
                         Inst copy = it->second;
                         copy.ops[0] = use.ops[i];
-                        kept.push_back(std::move(copy));
+                        keep(std::move(copy));
                     }
                 } else {
                     for (size_t i = 1; i + 1 < use.ops.size(); i += 2) {
@@ -268,7 +274,7 @@ class Reader {
                         copy.op = Op::OpMemberDecorate;
                         copy.ops[0] = use.ops[i];
                         copy.ops.insert(copy.ops.begin() + 1, use.ops[i + 1]);
-                        kept.push_back(std::move(copy));
+                        keep(std::move(copy));
                     }
                 }
             }

@@ -59,6 +59,9 @@ class Linker {
         if (input_.stages.empty()) ir::fail("pipeline-empty", "", 0, "a pipeline needs at least one stage");
         if (input_.stages.size() > 4000)
             ir::fail("pipeline-too-large", "", 0, "a pipeline of more than 4000 stages is not supported");
+        if (!options_.stop_after.empty() && options_.stop_after != "split" && options_.stop_after != "finish")
+            ir::fail("unknown-pass", "", 0,
+                     "no pass is called '" + options_.stop_after + "'; text can be had after 'split' and 'finish'");
         if (options_.max_recursion_depth > 31)
             ir::fail("recursion-limit", "", 0, "the recursion depth is at most 31");
         bool raygen = false;
@@ -66,8 +69,8 @@ class Linker {
         if (!raygen) ir::fail("pipeline-without-raygen", "", 0, "a pipeline needs a ray generation stage");
         for (const GroupInput& group : input_.groups) {
             auto check = [&](int index, std::initializer_list<StageKind> kinds, const char* what) {
-                if (index < 0) return;
-                if (index >= static_cast<int>(input_.stages.size()))
+                if (index == -1) return;
+                if (index < 0 || index >= static_cast<int>(input_.stages.size()))
                     ir::fail("group-stage", "", 0,
                              "group '" + group.name + "' names stage " + std::to_string(index) + ", there are " +
                                  std::to_string(input_.stages.size()));
@@ -122,13 +125,11 @@ class Linker {
     void add_stage(uint32_t index, std::map<uint32_t, uint32_t>& spec_ids) {
         const StageInput& stage_input = input_.stages[index];
         ir::Module& module = modules_[index];
-        if (options_.validate) {
-            std::vector<uint32_t> words = ir::write_module(module, false);
-            const std::string problem = link::validate(words, 3, true);
-            if (!problem.empty())
-                ir::fail("spirv-invalid", stage_input.file, 0,
-                         "stage '" + stage_input.name + "' is not valid SPIR-V: " + problem);
-        }
+        // Always, also when the result's validation is switched off: the passes rely on valid input.
+        const std::string problem = link::validate(ir::write_module(module, false), 3, true);
+        if (!problem.empty())
+            ir::fail("spirv-invalid", stage_input.file, 0,
+                     "stage '" + stage_input.name + "' is not valid SPIR-V: " + problem);
         const ir::EntryPoint* entry = nullptr;
         for (const ir::EntryPoint& candidate : module.entry_points)
             if (candidate.name == stage_input.entry && candidate.model == execution_model(stage_input.kind))
@@ -180,6 +181,10 @@ class Linker {
         report.record_bytes = stage.record_bytes;
         if (stage.incoming)
             report.payload_words = program_.word_count(program_.pointee(program_.def(stage.incoming)->type), "payload");
+        if (stage.attribute) {
+            uint32_t& words = result_.reflection.attribute_words;
+            words = std::max(words, program_.word_count(program_.pointee(program_.def(stage.attribute)->type), "attribute"));
+        }
         const size_t before = machine_.states.size();
         continuation::split_stage(program_, stage, kinds_, machine_);
         report.states = static_cast<uint32_t>(machine_.states.size() - before);

@@ -118,7 +118,7 @@ void unify_resources(Program& p, lower::Stage& stage, ResourceTable& table, Refl
         if (!fresh && place->second.first != kind)
             stage.fail("resource-conflict", {},
                        "set " + std::to_string(set) + " binding " + std::to_string(binding) + " ('" +
-                           p.module.name_of(id) + "') is a " + kind + " here and a " + place->second.first +
+                           p.module.name_of(id) + "') is declared as " + kind + " here and as " + place->second.first +
                            " in stage '" + place->second.second + "'",
                        p);
         std::vector<uint32_t> key{set, binding, variable.type, variable.ops[0]};

@@ -35,10 +35,18 @@ bool optimize(std::vector<uint32_t>& spirv, Optimization level, std::string& mes
     optimizer.SetMessageConsumer([&](spv_message_level_t severity, const char*, const spv_position_t&, const char* text) {
         if (severity <= SPV_MSG_ERROR && message.empty()) message = text;
     });
-    if (level == Optimization::Performance)
-        optimizer.RegisterPerformancePasses();
-    else
-        optimizer.RegisterSizePasses();
+    // Local passes only. SPIRV-Tools' own recipes inline every function and turn the machine's
+    // variables into phis of its loops: quadratic in the states, and drivers do it anyway.
+    // Nothing here touches NoContraction or reorders float operations.
+    optimizer.RegisterPass(spvtools::CreateDeadBranchElimPass());
+    optimizer.RegisterPass(spvtools::CreateLocalSingleBlockLoadStoreElimPass());
+    optimizer.RegisterPass(spvtools::CreateLocalAccessChainConvertPass());
+    optimizer.RegisterPass(spvtools::CreateLocalSingleBlockLoadStoreElimPass());
+    optimizer.RegisterPass(spvtools::CreateSimplificationPass());
+    if (level == Optimization::Performance) optimizer.RegisterPass(spvtools::CreateLocalRedundancyEliminationPass());
+    optimizer.RegisterPass(spvtools::CreateAggressiveDCEPass());
+    optimizer.RegisterPass(spvtools::CreateBlockMergePass());
+    optimizer.RegisterPass(spvtools::CreateCompactIdsPass());
     spvtools::OptimizerOptions options;
     options.set_preserve_spec_constants(true);
     options.set_run_validator(false);
