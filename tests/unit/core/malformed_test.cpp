@@ -386,7 +386,9 @@ TEST(Malformed, PipelineDescriptions) {
     }
     LinkOptions options;
     options.stop_after = "no-such-pass";
-    expect_clear_error(link_pipeline(input, options), "a pass that does not exist");
+    const LinkResult result = link_pipeline(input, options);
+    expect_clear_error(result, "a pass that does not exist");
+    EXPECT_EQ(result.diagnostics.front().id, "unknown-pass");
 }
 
 }  // namespace
