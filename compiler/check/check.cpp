@@ -1,3 +1,4 @@
+// The rules of check.h, per stage and across the pipeline.
 #include "check/check.h"
 
 #include <algorithm>

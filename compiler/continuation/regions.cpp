@@ -1,3 +1,4 @@
+// Dominators, and from them the constructs of a stage body.
 #include "continuation/regions.h"
 
 #include <algorithm>

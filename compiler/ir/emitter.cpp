@@ -1,3 +1,4 @@
+// Instruction appending and word conversion; see emitter.h.
 #include "ir/emitter.h"
 
 namespace rtc::ir {

@@ -1,3 +1,4 @@
+// Interning, lookups and import of modules into one id space.
 #include "ir/program.h"
 
 #include <algorithm>
@@ -253,6 +254,14 @@ bool Program::member_decoration(Id id, uint32_t member, spv::Decoration decorati
         return true;
     }
     return false;
+}
+
+void Program::copy_decorations(Id from, Id to) {
+    std::vector<Inst> copies;  // decorate() moves what decorations_of points at
+    for (const Inst* inst : decorations_of(from)) copies.push_back(*inst);
+    for (const Inst& inst : copies)
+        if (inst.op == Op::OpDecorate)
+            decorate(to, static_cast<spv::Decoration>(inst.ops[1]), {inst.ops.begin() + 2, inst.ops.end()});
 }
 
 void Program::remove_decorations(Id id, spv::Decoration decoration) {

@@ -63,6 +63,7 @@ class Program {
     std::vector<const Inst*> decorations_of(Id id) const;
     bool decoration(Id id, spv::Decoration decoration, uint32_t* operand = nullptr) const;
     bool member_decoration(Id id, uint32_t member, spv::Decoration decoration, uint32_t* operand = nullptr) const;
+    void copy_decorations(Id from, Id to);  // for a clone of a value; member decorations stay behind
     void remove_decorations(Id id, spv::Decoration decoration);
 
     // Source file index in module.files for `name`.

@@ -1,3 +1,4 @@
+// Specialisation constants of a stage instance: baked in, or renumbered for the pipeline.
 #include "link/link.h"
 
 namespace rtc::link {

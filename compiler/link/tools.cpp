@@ -1,3 +1,4 @@
+// SPIRV-Tools as validator and optimiser.
 #include <spirv-tools/libspirv.hpp>
 #include <spirv-tools/optimizer.hpp>
 

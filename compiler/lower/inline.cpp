@@ -117,7 +117,7 @@ class Inliner {
                 Inst clone = inst;
                 if (clone.result) {
                     clone.result = mapped(clone.result);
-                    copy_decorations(inst.result, clone.result);
+                    p_.copy_decorations(inst.result, clone.result);
                 }
                 clone.for_each_id([&](Id& id) { id = mapped(id); });
                 if (clone.op == Op::OpVariable) {
@@ -165,14 +165,6 @@ class Inliner {
                       std::make_move_iterator(inlined.end()));
         std::vector<Inst>& first = blocks.front().insts;
         first.insert(first.begin(), variables.begin(), variables.end());
-    }
-
-    void copy_decorations(Id from, Id to) {
-        std::vector<Inst> copies;
-        for (const Inst* inst : p_.decorations_of(from)) copies.push_back(*inst);
-        for (const Inst& inst : copies)
-            if (inst.op == Op::OpDecorate)
-                p_.decorate(to, static_cast<spv::Decoration>(inst.ops[1]), {inst.ops.begin() + 2, inst.ops.end()});
     }
 
     Program& p_;

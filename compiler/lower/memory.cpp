@@ -197,7 +197,7 @@ class MemoryForm {
                     copy.source = found->second.inst.source;
                 }
                 copy.result = p_.module.new_id();
-                copy_decorations(id, copy.result);
+                p_.copy_decorations(id, copy.result);
                 out.push_back(copy);
                 return local[id] = copy.result;
             };
@@ -218,14 +218,6 @@ class MemoryForm {
             // The result of a suspending call is stored after it, by the splitter, through the same store.
             blocks[b].insts = std::move(out);
         }
-    }
-
-    void copy_decorations(Id from, Id to) {
-        std::vector<Inst> copies;
-        for (const Inst* inst : p_.decorations_of(from)) copies.push_back(*inst);
-        for (const Inst& inst : copies)
-            if (inst.op == Op::OpDecorate)
-                p_.decorate(to, static_cast<spv::Decoration>(inst.ops[1]), {inst.ops.begin() + 2, inst.ops.end()});
     }
 
     Program& p_;
