@@ -206,6 +206,30 @@ void rtrGetAccelerationStructureMemoryRequirements(RtrDevice d,
     out->memoryRequirements.memoryTypeBits = 0xffffffffu;
 }
 
+static VkResult bind_address(RtrDevice d, RtrAccelerationStructure as, VkBuffer buffer, VkDeviceSize offset,
+                             unsigned i) {
+    VkBufferDeviceAddressInfo info = {.sType = VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO};
+    VkDeviceAddress address;
+    if (!d->get_buffer_device_address)
+        return rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "address-mode",
+                         "bind %u: a buffer, but the RtrDevice was created without bufferDeviceAddress", i);
+    if (offset % RTC_AS_ALIGNMENT)
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "bind-offset",
+                         "bind %u: bufferOffset %llu must be a multiple of 256", i,
+                         (unsigned long long)offset);
+    info.buffer = buffer;
+    address = d->get_buffer_device_address(d->device, &info);
+    if (!address || address % RTC_QUAD_BYTES)
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "bind-address",
+                         "bind %u: the buffer's device address is 0x%llx; it needs the usages of "
+                         "RTR_ADDRESS_BUFFER_USAGE and memory",
+                         i, (unsigned long long)address);
+    as->buffer = buffer;
+    as->offset = offset;
+    as->base = address + offset;
+    return VK_SUCCESS;
+}
+
 VkResult rtrBindAccelerationStructureMemory(RtrDevice d, uint32_t count,
                                             const RtrBindAccelerationStructureMemoryInfo* infos) {
     uint32_t i;
@@ -214,44 +238,50 @@ VkResult rtrBindAccelerationStructureMemory(RtrDevice d, uint32_t count,
         if (b->pNext)
             return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "pNext",
                              "RtrBindAccelerationStructureMemoryInfo::pNext must be NULL");
-        if (!b->accelerationStructure || !b->heap || b->accelerationStructure->heap)
+        RtrAccelerationStructure as = b->accelerationStructure;
+        if (!as || as->buffer || !b->heap == !b->buffer)
             return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "bind",
-                             "bind %u: needs an acceleration structure not bound yet, and a heap", i);
+                             "bind %u: needs an acceleration structure not bound yet, and a heap or (address "
+                             "mode) a buffer, not both",
+                             i);
+        if (b->buffer) {
+            VkResult r = bind_address(d, as, b->buffer, b->bufferOffset, i);
+            if (r != VK_SUCCESS) return r;
+            continue;
+        }
         if (b->heapOffset == 0 || b->heapOffset % RTC_AS_ALIGNMENT)
             return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "bind-offset",
                              "bind %u: heapOffset %llu must be a multiple of 256 and not 0", i,
                              (unsigned long long)b->heapOffset);
-        if (b->heapOffset > b->heap->size || b->accelerationStructure->size > b->heap->size - b->heapOffset)
+        if (b->heapOffset > b->heap->size || as->size > b->heap->size - b->heapOffset)
             return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "bind-range",
                              "bind %u: %llu bytes at %llu do not fit a heap of %llu", i,
-                             (unsigned long long)b->accelerationStructure->size,
+                             (unsigned long long)as->size,
                              (unsigned long long)b->heapOffset, (unsigned long long)b->heap->size);
-        b->accelerationStructure->heap = b->heap;
-        b->accelerationStructure->heap_offset = b->heapOffset;
+        as->heap = b->heap;
+        as->buffer = b->heap->buffer;
+        as->offset = b->heap->offset + b->heapOffset;
+        as->base = b->heapOffset / RTC_QUAD_BYTES;
     }
     return VK_SUCCESS;
 }
 
 VkResult rtrGetAccelerationStructureHandle(RtrDevice d, RtrAccelerationStructure as, size_t size,
                                            void* data) {
-    uint64_t base;
-    if (!as->heap)
+    if (!as->buffer)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "not-bound", "handle of an unbound structure");
-    if (size < sizeof base)
+    if (size < sizeof as->base)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "handle-size", "dataSize must be 8 or more");
-    base = rtr_as_base(as);
-    memcpy(data, &base, sizeof base);
+    memcpy(data, &as->base, sizeof as->base);
     return VK_SUCCESS;
 }
 
 VkResult rtrGetAccelerationStructureDescriptor(RtrDevice d, RtrAccelerationStructure as,
                                                VkDescriptorBufferInfo* info) {
-    if (!as->heap)
+    if (!as->buffer)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "not-bound",
                          "descriptor of an unbound structure");
-    info->buffer = as->heap->buffer;
-    info->offset = as->heap->offset + as->heap_offset;
-    info->range = RTC_AS_HEADER_QUADS * RTC_QUAD_BYTES;
+    *info = rtr_header_info(as);
     return VK_SUCCESS;
 }
 

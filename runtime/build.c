@@ -35,7 +35,7 @@ void rtr_update_scratch(uint32_t n, uint32_t geometries, RtrScratchLayout* l) {
 VkResult rtr_bind_arrays(RtrBuild* b, uint32_t nodes_at, uint32_t slots_at) {
     RtrDevice d = b->device;
     const VkDeviceSize limit = d->limits.maxStorageBufferRange;
-    const VkDeviceSize base = b->dst->heap->offset + b->dst->heap_offset;
+    const VkDeviceSize base = b->dst->offset;
     const VkDeviceSize end = base + b->dst->size;
     VkDescriptorBufferInfo infos[RTR_ARR_COUNT];
     VkWriteDescriptorSet writes[RTR_ARR_COUNT];
@@ -46,17 +46,17 @@ VkResult rtr_bind_arrays(RtrBuild* b, uint32_t nodes_at, uint32_t slots_at) {
     for (i = 0; i < RTR_ARR_COUNT; i++) {
         VkDescriptorBufferInfo* info = &infos[i];
         if (i == RTR_ARR_DST_HEADER) {
-            info->buffer = b->dst->heap->buffer;
+            info->buffer = b->dst->buffer;
             info->offset = base;
             info->range = RTC_AS_HEADER_QUADS * RTC_QUAD_BYTES;
         } else if (i == RTR_ARR_DST_NODES) {
-            info->buffer = b->dst->heap->buffer;
+            info->buffer = b->dst->buffer;
             info->offset =
                 base + RTC_QUAD_BYTES * (RTC_AS_HEADER_QUADS + (VkDeviceSize)RTC_NODE_QUADS * nodes_at);
             info->range =
                 rtr_min_size(limit, base + RTC_QUAD_BYTES * (VkDeviceSize)b->slots_quad - info->offset);
         } else if (i == RTR_ARR_DST_SLOTS) {
-            info->buffer = b->dst->heap->buffer;
+            info->buffer = b->dst->buffer;
             info->offset =
                 base + RTC_QUAD_BYTES * (b->slots_quad + (VkDeviceSize)rtr_slot_quads(b->dst) * slots_at);
             if (info->offset >= end) continue; /* no slots at all */
@@ -106,7 +106,7 @@ static VkResult emit_leaves(RtrBuild* b) {
         if (r != VK_SUCCESS) return r;
         b->push.window_first = b->push.first;
         b->push.window_count = b->push.count;
-        rtr_dispatch(b, RTR_KERNEL_leaf_instances, rtr_groups(b->push.count, RTR_GROUP));
+        rtr_dispatch(b, rtr_instance_kernel(b->dst), rtr_groups(b->push.count, RTR_GROUP));
         return VK_SUCCESS;
     }
     rtr_dispatch(b, kernel, rtr_groups(b->push.count, RTR_GROUP));
@@ -195,7 +195,7 @@ static VkResult check_build(RtrBuild* b, const VkAccelerationStructureInfoNV* in
     if (info->pNext)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "pNext",
                          "VkAccelerationStructureInfoNV::pNext must be NULL");
-    if (!dst || !dst->heap)
+    if (!dst || !dst->buffer)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "not-bound", "build: dst is not bound");
     if (info->type != dst->type || info->flags != dst->flags)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "as-info",
@@ -210,7 +210,7 @@ static VkResult check_build(RtrBuild* b, const VkAccelerationStructureInfoNV* in
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "update-not-allowed",
                          "update of a structure without ALLOW_UPDATE");
     if (update && src &&
-        (src->type != dst->type || src->primitive_count != dst->primitive_count || !src->heap))
+        (src->type != dst->type || src->primitive_count != dst->primitive_count || !src->buffer))
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "update-src", "update: src does not match dst");
     if (top) {
         if (info->instanceCount > dst->instance_count ||
@@ -272,10 +272,10 @@ VkResult rtrCmdBuildAccelerationStructure(RtrRecorder recorder, const VkAccelera
     b.node_window = window_of(b.device, RTC_NODE_QUADS * RTC_QUAD_BYTES);
     b.slot_window = window_of(b.device, rtr_slot_quads(dst) * RTC_QUAD_BYTES);
     b.push.total = b.primitives;
-    b.push.self_lo = (uint32_t)rtr_as_base(dst);
-    b.push.self_hi = (uint32_t)(rtr_as_base(dst) >> 32);
+    b.push.self_lo = (uint32_t)dst->base;
+    b.push.self_hi = (uint32_t)(dst->base >> 32);
     b.push.slots_quad = b.slots_quad;
-    b.push.heap_quads = (uint32_t)(dst->heap->size / RTC_QUAD_BYTES);
+    b.push.heap_quads = dst->heap ? (uint32_t)(dst->heap->size / RTC_QUAD_BYTES) : 0;
     b.push.slot_quads = rtr_slot_quads(dst);
     b.push.build_flags = info->flags;
     b.push.geometry_count = info->geometryCount;
@@ -285,7 +285,8 @@ VkResult rtrCmdBuildAccelerationStructure(RtrRecorder recorder, const VkAccelera
         b.push.flags |= RTR_BUILD_KEEP_DEGENERATE;
     for (g = 0; g < info->geometryCount; g++)
         opaque = opaque && (info->pGeometries[g].flags & VK_GEOMETRY_OPAQUE_BIT_NV);
-    b.push.facts = (dst->aabbs ? RTC_FACT_AABBS : 0u) | (opaque ? RTC_FACT_ALL_OPAQUE : 0u);
+    b.push.facts = (dst->aabbs ? RTC_FACT_AABBS : 0u) | (opaque ? RTC_FACT_ALL_OPAQUE : 0u) |
+                   (dst->heap ? 0u : RTC_FACT_ADDRESSES);
     if (update) {
         rtr_update_scratch(dst->primitive_count, dst->geometry_count, &b.layout);
         return rtr_record_update(&b, src);

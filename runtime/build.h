@@ -23,6 +23,10 @@ typedef struct RtrBuild {
     VkDescriptorSet arrays;            /* bound now */
 } RtrBuild;
 
+static inline RtrKernel rtr_instance_kernel(RtrAccelerationStructure dst) {
+    return dst->heap ? RTR_KERNEL_leaf_instances : RTR_KERNEL_leaf_instances_address;
+}
+
 VkResult rtr_check_geometry(RtrDevice d, const VkGeometryNV* g, unsigned index, uint32_t* primitives);
 
 /* How a vertex format is read; false when the extension does not list it. */

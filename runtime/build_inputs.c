@@ -39,7 +39,7 @@ static VkResult bind_inputs(RtrBuild* b, Window data, Window index, Window trans
         writes[count].pBufferInfo = &infos[i];
         count++;
     }
-    if (b->dst->type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV) {
+    if (b->dst->type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV && b->dst->heap) {
         writes[count].sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
         writes[count].dstSet = set;
         writes[count].dstBinding = RTR_IN_HEAP;

@@ -18,7 +18,7 @@ static VkResult bind_copy(RtrRecorder rec, RtrHeap heap, uint32_t array, VkBuffe
     writes[0].dstBinding = RTR_IN_HEAP;
     writes[0].descriptorCount = 1;
     writes[0].descriptorType = VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER;
-    writes[0].pTexelBufferView = &heap->view;
+    if (heap) writes[0].pTexelBufferView = &heap->view;
     writes[1].sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
     writes[1].dstSet = sets[1];
     writes[1].dstBinding = array;
@@ -31,7 +31,7 @@ static VkResult bind_copy(RtrRecorder rec, RtrHeap heap, uint32_t array, VkBuffe
         writes[2].pBufferInfo = header;
         count = 3;
     }
-    d->vk.UpdateDescriptorSets(d->device, count, writes, 0, NULL);
+    d->vk.UpdateDescriptorSets(d->device, heap ? count : count - 1, heap ? writes : writes + 1, 0, NULL);
     d->vk.CmdBindDescriptorSets(rec->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, d->kernel_layout, 0, 2, sets, 0,
                                 NULL);
     return VK_SUCCESS;
@@ -60,28 +60,28 @@ VkResult rtrCmdCopyAccelerationStructure(RtrRecorder rec, RtrAccelerationStructu
     if (!compact && mode != VK_COPY_ACCELERATION_STRUCTURE_MODE_CLONE_NV)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "copy-mode", "copy mode %d: CLONE or COMPACT",
                          (int)mode);
-    if (!dst || !src || dst == src || !dst->heap || dst->heap != src->heap || dst->type != src->type)
+    if (!dst || !src || dst == src || !dst->buffer || !src->buffer || dst->heap != src->heap || dst->type != src->type)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "copy",
-                         "copy: two different structures of one type, bound to the same heap, are needed");
+                         "copy: two different structures of one type, bound to the same heap or both to buffers, are needed");
     if (!compact && dst->size < src->size)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "copy-size", "clone of %llu bytes into %llu",
                          (unsigned long long)src->size, (unsigned long long)dst->size);
     quads = (uint32_t)(rtr_min_size(dst->size, src->size) / RTC_QUAD_BYTES);
     memset(&push, 0, sizeof push);
-    push.self_lo = (uint32_t)rtr_as_base(dst);
-    push.self_hi = (uint32_t)(rtr_as_base(dst) >> 32);
-    push.src_lo = (uint32_t)rtr_as_base(src);
-    push.src_hi = (uint32_t)(rtr_as_base(src) >> 32);
+    push.self_lo = (uint32_t)dst->base;
+    push.self_hi = (uint32_t)(dst->base >> 32);
+    push.src_lo = (uint32_t)src->base;
+    push.src_hi = (uint32_t)(src->base >> 32);
     push.step = compact;
     for (at = 0; at < quads; at += window) {
         push.window_first = at;
         push.window_count = quads - at < window ? quads - at : window;
-        r = bind_copy(rec, dst->heap, RTR_ARR_DST_SLOTS, dst->heap->buffer,
-                      dst->heap->offset + dst->heap_offset + (VkDeviceSize)at * RTC_QUAD_BYTES,
+        r = bind_copy(rec, dst->heap, RTR_ARR_DST_SLOTS, dst->buffer,
+                      dst->offset + (VkDeviceSize)at * RTC_QUAD_BYTES,
                       (VkDeviceSize)push.window_count * RTC_QUAD_BYTES, NULL);
         if (r != VK_SUCCESS) return r;
         if (at) rtr_compute_barrier(rec);
-        dispatch(rec, RTR_KERNEL_copy, &push, rtr_groups(push.window_count, RTR_GROUP));
+        dispatch(rec, dst->heap ? RTR_KERNEL_copy : RTR_KERNEL_copy_address, &push, rtr_groups(push.window_count, RTR_GROUP));
     }
     return VK_SUCCESS;
 }
@@ -108,11 +108,9 @@ VkResult rtrCmdWriteAccelerationStructuresProperties(RtrRecorder rec, uint32_t c
         VkDescriptorBufferInfo header;
         struct RtrBuildPush push;
         VkResult r;
-        if (!as || !as->heap)
+        if (!as || !as->buffer)
             return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "not-bound", "structure %u is not bound", i);
-        header.buffer = as->heap->buffer;
-        header.offset = as->heap->offset + as->heap_offset;
-        header.range = RTC_AS_HEADER_QUADS * RTC_QUAD_BYTES;
+        header = rtr_header_info(as);
         r = bind_copy(rec, as->heap, RTR_ARR_OUT, dst, begin, at + 8 - begin, &header);
         if (r != VK_SUCCESS) return r;
         memset(&push, 0, sizeof push);

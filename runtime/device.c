@@ -32,6 +32,12 @@ static VkResult create_layouts(RtrDevice d, const VkAllocationCallbacks* a) {
     return d->vk.CreatePipelineLayout(d->device, &layout, a, &d->kernel_layout);
 }
 
+static bool is_address_kernel(RtrKernel kernel) {
+#define X(name) || kernel == RTR_KERNEL_##name
+    return false RTR_ADDRESS_KERNELS(X);
+#undef X
+}
+
 static VkResult create_kernels(RtrDevice d, VkPipelineCache cache, const VkAllocationCallbacks* a) {
     /* Constant 0: memory fences in divergent code, see kernels/common.glsl. */
     const VkBool32 fences = strstr(d->support.deviceName, "llvmpipe") == NULL;
@@ -44,6 +50,7 @@ static VkResult create_kernels(RtrDevice d, VkPipelineCache cache, const VkAlloc
         VkComputePipelineCreateInfo info = {.sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO};
         VkShaderModule handle;
         VkResult r;
+        if (is_address_kernel((RtrKernel)k) && !d->get_buffer_device_address) continue;
         module.codeSize = code->bytes;
         module.pCode = code->words;
         r = d->vk.CreateShaderModule(d->device, &module, a, &handle);
@@ -112,6 +119,17 @@ VkResult rtrCreateDevice(const RtrDeviceCreateInfo* info, const VkAllocationCall
         }
         r = VK_ERROR_FEATURE_NOT_PRESENT;
         goto fail;
+    }
+    if (info->bufferDeviceAddress) {
+        d->get_buffer_device_address =
+            d->support.addressMode ? rtr_load_buffer_device_address(&d->vki, d->device) : NULL;
+        if (!d->get_buffer_device_address) {
+            r = rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "address-mode",
+                          "RtrDeviceCreateInfo::bufferDeviceAddress: %s",
+                          d->support.addressMode ? "vkGetBufferDeviceAddress is missing; enable the feature"
+                                                 : "the physical device has no such feature");
+            goto fail;
+        }
     }
     d->vki.GetPhysicalDeviceProperties2(d->physical_device, &properties);
     d->limits = properties.properties.limits;

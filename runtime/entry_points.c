@@ -28,3 +28,9 @@ bool rtr_load_device_table(const RtrInstanceTable* instance, VkDevice device, Rt
 #undef X
     return true;
 }
+
+RtrGetBufferDeviceAddress rtr_load_buffer_device_address(const RtrInstanceTable* instance, VkDevice device) {
+    PFN_vkVoidFunction f = instance->GetDeviceProcAddr(device, "vkGetBufferDeviceAddressKHR");
+    if (!f) f = instance->GetDeviceProcAddr(device, "vkGetBufferDeviceAddress");
+    return (RtrGetBufferDeviceAddress)f;
+}

@@ -45,6 +45,10 @@
     X(CmdFillBuffer)              \
     X(CmdCopyBuffer)
 
+/* Only there with bufferDeviceAddress. */
+typedef VkDeviceAddress(VKAPI_PTR* RtrGetBufferDeviceAddress)(VkDevice,
+                                                              const VkBufferDeviceAddressInfo*);
+
 typedef struct RtrInstanceTable {
 #define X(name) PFN_vk##name name;
     RTR_INSTANCE_FUNCTIONS(X)
@@ -62,6 +66,8 @@ bool rtr_load_instance_table(VkInstance instance, PFN_vkGetInstanceProcAddr get,
                              const char** missing);
 bool rtr_load_device_table(const RtrInstanceTable* instance, VkDevice device, RtrDeviceTable* table,
                            const char** missing);
+/* NULL when neither Vulkan 1.2 nor VK_KHR_buffer_device_address gives it. */
+RtrGetBufferDeviceAddress rtr_load_buffer_device_address(const RtrInstanceTable* instance, VkDevice device);
 
 /* ---- Kernels ------------------------------------------------------------------- */
 #define RTR_KERNELS(X)  \
@@ -90,7 +96,12 @@ bool rtr_load_device_table(const RtrInstanceTable* instance, VkDevice device, Rt
     X(refit_nodes)      \
     X(prepare_launch)   \
     X(finish_launch)    \
-    X(probe)
+    X(probe)                \
+    RTR_ADDRESS_KERNELS(X)
+/* Variants that follow device addresses; created only with bufferDeviceAddress. */
+#define RTR_ADDRESS_KERNELS(X) \
+    X(leaf_instances_address)  \
+    X(copy_address)
 
 typedef enum RtrKernel {
 #define X(name) RTR_KERNEL_##name,
@@ -126,6 +137,7 @@ struct RtrDevice_T {
     VkDescriptorSetLayout array_layout; /* set 1 */
     VkDescriptorSetLayout empty_layout;
     VkPipelineLayout kernel_layout;
+    RtrGetBufferDeviceAddress get_buffer_device_address; /* NULL: no address mode */
     VkPipeline kernels[RTR_KERNEL_COUNT];
 };
 
@@ -155,8 +167,11 @@ struct RtrAccelerationStructure_T {
     uint32_t primitive_count; /* instances of a top level */
     bool aabbs;
     VkDeviceSize size; /* of the object */
-    RtrHeap heap;
-    VkDeviceSize heap_offset;
+    /* Where it lies; buffer is VK_NULL_HANDLE until it is bound. */
+    VkBuffer buffer;
+    VkDeviceSize offset; /* in the buffer */
+    RtrHeap heap;        /* NULL in address mode */
+    uint64_t base;       /* the handle: quads from the heap's start, or a device address */
 };
 
 #define RTR_POOL_SETS 64u
@@ -267,9 +282,6 @@ typedef struct RtrScratchLayout {
 void rtr_build_scratch(uint32_t primitives, RtrScratchLayout* layout);
 void rtr_update_scratch(uint32_t primitives, uint32_t geometries, RtrScratchLayout* layout);
 
-static inline uint64_t rtr_as_base(const struct RtrAccelerationStructure_T* as) {
-    return as->heap_offset / RTC_QUAD_BYTES;
-}
 static inline uint32_t rtr_slot_quads(const struct RtrAccelerationStructure_T* as) {
     if (as->type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV) return RTC_INSTANCE_QUADS;
     return as->aabbs ? RTC_AABB_QUADS : RTC_TRIANGLE_QUADS;
@@ -299,5 +311,14 @@ void rtr_free_module(const VkAllocationCallbacks* allocator, RtrModule* module);
 
 /* Layout bindings of the reserved set that `used` names, at `base`; returns their number. */
 uint32_t rtr_reserved_bindings(uint32_t used, uint32_t base, VkDescriptorSetLayoutBinding* bindings);
+
+/* What a binding of `as`'s header is. */
+static inline VkDescriptorBufferInfo rtr_header_info(const struct RtrAccelerationStructure_T* as) {
+    VkDescriptorBufferInfo info;
+    info.buffer = as->buffer;
+    info.offset = as->offset;
+    info.range = RTC_AS_HEADER_QUADS * RTC_QUAD_BYTES;
+    return info;
+}
 
 #endif /* RTR_INTERNAL_H_ */

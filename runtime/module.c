@@ -243,9 +243,10 @@ static VkResult unpack(RtrDevice d, const uint8_t* bytes, size_t size, const VkA
         return damaged(d, "its reflection is shorter than its header says");
     if (h->reserved_set > 31 || h->reserved_binding > (1u << 24) || h->scratch_words > (1u << 20))
         return damaged(d, "its reflection holds impossible numbers");
-    if (h->flags & RTC_MODULE_ADDRESS_MODE)
+    if (h->flags & RTC_MODULE_ADDRESS_MODE && !d->get_buffer_device_address)
         return rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "address-mode",
-                         "module was linked for address mode, which this runtime does not have yet");
+                         "module was linked for address mode, but the RtrDevice was created without "
+                         "bufferDeviceAddress; link it with --addressing=heap, or enable the feature");
     m->groups = rtr_alloc(a, groups);
     m->json = rtr_alloc(a, (size_t)h->json_bytes + 1);
     if (!m->groups || !m->json) return VK_ERROR_OUT_OF_HOST_MEMORY;

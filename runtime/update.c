@@ -6,7 +6,7 @@ static VkResult emit_instances(RtrBuild* b) {
     if (r != VK_SUCCESS) return r;
     b->push.window_first = b->push.first;
     b->push.window_count = b->push.count;
-    rtr_dispatch(b, RTR_KERNEL_leaf_instances, rtr_groups(b->push.count, RTR_GROUP));
+    rtr_dispatch(b, rtr_instance_kernel(b->dst), rtr_groups(b->push.count, RTR_GROUP));
     return VK_SUCCESS;
 }
 

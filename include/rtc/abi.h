@@ -66,6 +66,7 @@
 #define RTC_FACT_NO_INSTANCE_FLAGS 16u /* every instance's flags are 0 */
 #define RTC_FACT_HAS_TRIANGLES 32u /* TLAS: some instance is of triangles */
 #define RTC_FACT_HAS_AABBS 64u /* TLAS: some instance is of AABBs */
+#define RTC_FACT_ADDRESSES 128u /* address mode: SELF and instance references are device addresses */
 
 /* Binary node, 64 bytes, both children's boxes (conservative):
  *   quad 0: child0.min.xyz, child 0 reference

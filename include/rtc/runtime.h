@@ -5,7 +5,9 @@
  * without the extension. Differences from VK_NV_ray_tracing, all of them:
  *  - Acceleration structures live in a heap (RtrHeap, one range of a VkBuffer of
  *    the application) instead of their own VkDeviceMemory. Everything one launch
- *    can reach lies in one heap.
+ *    can reach lies in one heap. Or, in address mode (devices with the feature
+ *    bufferDeviceAddress, modules linked with rtc --addressing=address), anywhere in
+ *    buffers with device addresses, as with VK_KHR_acceleration_structure.
  *  - Commands are recorded through an RtrRecorder, because ray tracing shares the
  *    compute bind point. AFTER ANY rtrCmd* CALL THE COMPUTE PIPELINE, DESCRIPTOR
  *    SETS AND PUSH CONSTANTS OF THE COMMAND BUFFER ARE UNDEFINED: bind your own
@@ -110,7 +112,7 @@ typedef struct RtrPhysicalDeviceSupport {
     RtrTraceOptions recommended;     /* no field is a default */
     VkBool32 needsResumableModules;  /* the device ends or kills long loops: use modules compiled resumable */
     VkBool32 heapMode;               /* always true when supported */
-    VkBool32 addressMode;            /* bufferDeviceAddress is there (the runtime does not use it yet) */
+    VkBool32 addressMode;            /* the feature bufferDeviceAddress is there, see RtrDeviceCreateInfo */
     VkDeviceSize maxHeapSizeTexel;   /* bytes of heap that RTR_FETCH_TEXEL can reach */
     VkDeviceSize maxHeapSizeStorage; /* bytes of heap that RTR_FETCH_STORAGE can reach */
     uint32_t subgroupSize;
@@ -141,13 +143,18 @@ typedef struct RtrDeviceCreateInfo {
      * used; VK_EXT_debug_utils itself is not needed. The callback may be called from
      * any thread that calls the runtime. */
     const VkDebugUtilsMessengerCreateInfoEXT* pMessenger;
+    /* Address mode: `device` was created with the feature bufferDeviceAddress (of Vulkan
+     * 1.2 or VK_KHR_buffer_device_address). Acceleration structures can then be bound to
+     * buffers, and modules linked for address mode run; heap mode stays available. */
+    VkBool32 bufferDeviceAddress;
 } RtrDeviceCreateInfo;
 
 /* Prepares the runtime on a VkDevice: builds its kernels (some 30 small compute
  * pipelines). The VkDevice must outlive it. `pAllocator` (may be NULL: malloc) is
  * used for this object and everything made from it when their own is NULL, and
  * passed on to Vulkan.
- * Errors: VK_ERROR_FEATURE_NOT_PRESENT with the missing limits by name. */
+ * Errors: VK_ERROR_FEATURE_NOT_PRESENT with the missing limits by name, or when
+ * bufferDeviceAddress is asked for and the physical device does not have it. */
 RTR_API VkResult rtrCreateDevice(const RtrDeviceCreateInfo* pCreateInfo,
                                  const VkAllocationCallbacks* pAllocator, RtrDevice* pDevice);
 /* Objects made from the device must be gone. NULL is ignored. */
@@ -181,6 +188,11 @@ RTR_API VkDescriptorType rtrTranslateDescriptorType(VkDescriptorType type);
 /* Buffer usages a heap needs. Device-local memory is best. */
 #define RTR_HEAP_BUFFER_USAGE                                                        \
     (VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | \
+     VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT)
+/* Buffer usages of a buffer that acceleration structures are bound to in address mode. Its
+ * memory needs VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT. */
+#define RTR_ADDRESS_BUFFER_USAGE                                                       \
+    (VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT | \
      VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT)
 /* Buffer usages of build and update scratch. */
 #define RTR_SCRATCH_BUFFER_USAGE (VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT)
@@ -251,22 +263,31 @@ typedef struct RtrBindAccelerationStructureMemoryInfo {
     RtrAccelerationStructure accelerationStructure;
     RtrHeap heap;
     VkDeviceSize heapOffset; /* from the heap's start; a multiple of 256, not 0 */
+    /* Address mode: heap is NULL, and the structure lies at bufferOffset (a multiple of
+     * 256) of a buffer with RTR_ADDRESS_BUFFER_USAGE that is bound to memory. */
+    VkBuffer buffer;
+    VkDeviceSize bufferOffset;
 } RtrBindAccelerationStructureMemoryInfo;
 
-/* Counterpart: vkBindAccelerationStructureMemoryNV. Once per object. A bottom level
- * and every top level that refers to it must be in the same heap. */
+/* Counterpart: vkBindAccelerationStructureMemoryNV; with a buffer, where
+ * VkAccelerationStructureCreateInfoKHR names it. Once per object. A bottom level and every
+ * top level that refers to it must be in the same heap, or both bound to buffers.
+ * Errors: VALIDATION_FAILED for ranges, for both or neither of heap and buffer;
+ * FEATURE_NOT_PRESENT for a buffer on a device without bufferDeviceAddress. */
 RTR_API VkResult rtrBindAccelerationStructureMemory(RtrDevice device, uint32_t bindInfoCount,
                                                     const RtrBindAccelerationStructureMemoryInfo* pBindInfos);
 
-/* The 64-bit reference for VkAccelerationStructureInstanceNV::accelerationStructureReference.
- * dataSize must be 8 or more. Counterpart: vkGetAccelerationStructureHandleNV. */
+/* The 64-bit reference for VkAccelerationStructureInstanceNV::accelerationStructureReference:
+ * in address mode the device address of the structure, otherwise a number only the runtime
+ * understands. dataSize must be 8 or more. Counterpart: vkGetAccelerationStructureHandleNV. */
 RTR_API VkResult rtrGetAccelerationStructureHandle(RtrDevice device,
                                                    RtrAccelerationStructure accelerationStructure,
                                                    size_t dataSize, void* pData);
 
 /* What to write into a VK_DESCRIPTOR_TYPE_STORAGE_BUFFER descriptor where the shader
  * declares accelerationStructureNV/EXT. The _Null form needs any heap that was
- * initialised: rays traced into it miss. */
+ * initialised: rays traced into it miss. (256 zero bytes of any STORAGE buffer are a null
+ * structure too, in both modes.) */
 RTR_API VkResult rtrGetAccelerationStructureDescriptor(RtrDevice device,
                                                        RtrAccelerationStructure accelerationStructure,
                                                        VkDescriptorBufferInfo* pInfo);
@@ -336,7 +357,8 @@ RTR_API VkResult rtrCmdBuildAccelerationStructure(RtrRecorder recorder,
                                                   VkDeviceSize scratchOffset);
 
 /* Clone or compact. dst must be large enough: for COMPACT created with the
- * compactedSize that the query returned. Both must be in the same heap.
+ * compactedSize that the query returned. Both must be in the same heap, or both be bound to
+ * buffers.
  * Counterpart: vkCmdCopyAccelerationStructureNV. Stage COMPUTE_SHADER. */
 RTR_API VkResult rtrCmdCopyAccelerationStructure(RtrRecorder recorder, RtrAccelerationStructure dst,
                                                  RtrAccelerationStructure src,
@@ -491,7 +513,8 @@ RTR_API VkResult rtrCmdBindDescriptorSets(RtrRecorder recorder, uint32_t firstSe
 /* Counterpart: vkCmdPushConstants. offset and size are multiples of 4. Remembered. */
 RTR_API VkResult rtrCmdPushConstants(RtrRecorder recorder, uint32_t offset, uint32_t size,
                                      const void* pValues);
-/* The heap whose acceleration structures the following launches use. */
+/* The heap whose acceleration structures the following launches use. Modules linked for
+ * address mode need none and ignore it. */
 RTR_API VkResult rtrCmdSetHeap(RtrRecorder recorder, RtrHeap heap);
 /* Device memory for suspended lanes and deep stacks; see rtrGetLaunchScratchSize.
  * offset: a multiple of 256. Launches that use the same scratch need a barrier between

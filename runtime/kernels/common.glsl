@@ -9,7 +9,15 @@ layout(push_constant, std430) uniform PushBlock { RtrBuildPush p; };
 layout(set = 0, binding = RTR_IN_DATA, std430) readonly buffer InData { uint in_data[]; };
 layout(set = 0, binding = RTR_IN_INDEX, std430) readonly buffer InIndex { uint in_index[]; };
 layout(set = 0, binding = RTR_IN_TRANSFORM, std430) readonly buffer InTransform { uint in_transform[]; };
+#ifdef RTR_ADDRESS
+// A block somewhere in device memory, by its address.
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Quads { uvec4 quads[]; };
+uvec4 block_quad(uint base_lo, uint base_hi, uint quad) { return Quads(uvec2(base_lo, base_hi)).quads[quad]; }
+#else
 layout(set = 0, binding = RTR_IN_HEAP) uniform usamplerBuffer in_heap;
+// A texel index has 31 bits; heaps are smaller than 2^31 quads.
+uvec4 block_quad(uint base_lo, uint base_hi, uint quad) { return texelFetch(in_heap, int(base_lo + quad)); }
+#endif
 
 #ifndef RTR_COHERENT
 #define RTR_COHERENT

@@ -1,11 +1,15 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// Clone and compact: one quad a lane, from the heap's texels into a window of the
+#ifdef RTR_ADDRESS
+#extension GL_EXT_buffer_reference : require
+#extension GL_EXT_buffer_reference_uvec2 : require
+#endif
+// Clone and compact: one quad a lane, from the heap's texels (address mode: by address) into a window of the
 // destination (RTR_ARR_DST_SLOTS, from quad p.window_first on). Compacting moves the slots
 // down behind the nodes in use; nothing inside a structure refers to its own base.
 #include "common.glsl"
 
-uvec4 source(uint quad) { return texelFetch(in_heap, int(p.src_lo + quad)); }
+uvec4 source(uint quad) { return block_quad(p.src_lo, p.src_hi, quad); }
 
 void main() {
     uint i = lane_index();

@@ -25,7 +25,7 @@ void main() {
     if (top) {
         facts = (RTC_FACT_ALL_OPAQUE | RTC_FACT_IDENTITY_TRANSFORMS | RTC_FACT_FULL_MASKS |
                  RTC_FACT_NO_INSTANCE_FLAGS) & ~state[RTR_ST_BROKEN];
-        facts |= state[RTR_ST_HAS];
+        facts |= state[RTR_ST_HAS] | (p.facts & RTC_FACT_ADDRESSES);
     }
     uint v = 0u;
     if (w == RTC_HDR_SELF_LO) v = p.self_lo;

@@ -1,5 +1,9 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
+#ifdef RTR_ADDRESS
+#extension GL_EXT_buffer_reference : require
+#extension GL_EXT_buffer_reference_uvec2 : require
+#endif
 // Instances: the record traversal reads, the facts, and a conservative world box.
 #include "common.glsl"
 #include "leaf.glsl"
@@ -97,9 +101,16 @@ void invert(vec4 m[3], out vec4 w[3]) {
     }
 }
 
-uvec4 heap_quad(uint base_lo, uint base_hi, uint quad) {
-    // A texel index has 31 bits; heaps are smaller than 2^31 quads.
-    return texelFetch(in_heap, int(base_lo + quad));
+// Whether the reference leads to a structure that was built. A device address can only be
+// followed on trust.
+bool is_structure(uint base_lo, uint base_hi) {
+#ifdef RTR_ADDRESS
+    uvec4 h1 = block_quad(base_lo, base_hi, RTC_HDR_FACTS / 4u);
+    if ((h1.x & RTC_FACT_ADDRESSES) == 0u) return false;
+#else
+    if (base_hi != 0u || base_lo > p.heap_quads - RTC_AS_HEADER_QUADS) return false;
+#endif
+    return block_quad(base_lo, base_hi, RTC_HDR_MAGIC / 4u).z == RTC_AS_MAGIC;
 }
 
 void main() {
@@ -119,8 +130,7 @@ void main() {
         active_ = (base_lo | base_hi) != 0u;
         // A reference to nothing that was built here is never followed; the header's first
         // offender tells which instance it was.
-        if (active_ && (base_hi != 0u || base_lo > p.heap_quads - RTC_AS_HEADER_QUADS ||
-                        heap_quad(base_lo, base_hi, RTC_HDR_MAGIC / 4u).z != RTC_AS_MAGIC)) {
+        if (active_ && !is_structure(base_lo, base_hi)) {
             active_ = false;
             atomicMin(state[RTR_ST_OFFENDER], p.first + i);
         }
@@ -130,10 +140,10 @@ void main() {
         vec4 w[3];
         w[0] = vec4(0.0); w[1] = vec4(0.0); w[2] = vec4(0.0);
         if (active_) {
-            uvec4 h1 = heap_quad(base_lo, base_hi, RTC_HDR_FACTS / 4u);
-            uvec4 h2 = heap_quad(base_lo, base_hi, RTC_HDR_BOUNDS_MIN / 4u);
-            uvec4 h3 = heap_quad(base_lo, base_hi, RTC_HDR_BOUNDS_MAX / 4u);
-            uvec4 h4 = heap_quad(base_lo, base_hi, RTC_HDR_NODES / 4u);
+            uvec4 h1 = block_quad(base_lo, base_hi, RTC_HDR_FACTS / 4u);
+            uvec4 h2 = block_quad(base_lo, base_hi, RTC_HDR_BOUNDS_MIN / 4u);
+            uvec4 h3 = block_quad(base_lo, base_hi, RTC_HDR_BOUNDS_MAX / 4u);
+            uvec4 h4 = block_quad(base_lo, base_hi, RTC_HDR_NODES / 4u);
             facts = h1.x;
             nodes = h4.x;
             slots = h4.y;

@@ -57,7 +57,7 @@ void main() {
                     dst_header[RTC_HDR_BOUNDS_MAX + k] = floatBitsToUint(hi[k]);
                 }
                 if ((p.flags & RTR_BUILD_TOP) != 0u) {
-                    dst_header[RTC_HDR_FACTS] = state[RTR_ST_HAS] |
+                    dst_header[RTC_HDR_FACTS] = state[RTR_ST_HAS] | (p.facts & RTC_FACT_ADDRESSES) |
                         ((RTC_FACT_ALL_OPAQUE | RTC_FACT_IDENTITY_TRANSFORMS | RTC_FACT_FULL_MASKS |
                           RTC_FACT_NO_INSTANCE_FLAGS) & ~state[RTR_ST_BROKEN]);
                     dst_header[RTC_HDR_FIRST_OFFENDER] = state[RTR_ST_OFFENDER];

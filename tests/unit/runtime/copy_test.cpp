@@ -19,8 +19,15 @@ std::vector<Vec3> ball(size_t count, uint32_t seed, float reach, float size = 0.
     return v;
 }
 
-class CopyTest : public RuntimeTest {
+// Parameter: address mode.
+class CopyTest : public RuntimeTest, public ::testing::WithParamInterface<bool> {
   protected:
+    void SetUp() override {
+        RuntimeTest::SetUp();
+        if (vk && GetParam() && !vk->GetBufferDeviceAddress)
+            GTEST_SKIP() << "the device has no bufferDeviceAddress";
+    }
+
     VkDeviceSize compacted_size(Scene& scene, RtrAccelerationStructure as) {
         Buffer out = scene.upload(nullptr, 512);
         RtrAccelerationStructure list[2] = {as, as};
@@ -35,10 +42,10 @@ class CopyTest : public RuntimeTest {
     }
 };
 
-TEST_F(CopyTest, CompactKeepsTheTree) {
+TEST_P(CopyTest, CompactKeepsTheTree) {
     for (int kind = 0; kind < 3; kind++) {
         SCOPED_TRACE(kind);
-        Scene scene(*vk, rtr, 4 << 20);
+        Scene scene(*vk, rtr, 4 << 20, GetParam());
         RtrAccelerationStructure as, leaf = nullptr;
         if (kind == 0) {
             as = scene.build_bottom({scene.triangles(ball(3000, 1, 0.1f, 0.1f))});
@@ -80,11 +87,11 @@ TEST_F(CopyTest, CompactKeepsTheTree) {
     }
 }
 
-TEST_F(CopyTest, RefitFollowsTheVertices) {
+TEST_P(CopyTest, RefitFollowsTheVertices) {
     for (bool in_place : {true, false}) {
         for (auto extra : {0, int(VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_BUILD_BIT_NV)}) {
             SCOPED_TRACE(in_place);
-            Scene scene(*vk, rtr, 8 << 20);
+            Scene scene(*vk, rtr, 8 << 20, GetParam());
             const auto flags = VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV | extra;
             auto a = ball(2000, 3, 1), b = ball(700, 4, 1);
             std::vector<uint32_t> indices;
@@ -130,8 +137,8 @@ TEST_F(CopyTest, RefitFollowsTheVertices) {
     }
 }
 
-TEST_F(CopyTest, RefitOfInstancesAndBoxes) {
-    Scene scene(*vk, rtr, 4 << 20);
+TEST_P(CopyTest, RefitOfInstancesAndBoxes) {
+    Scene scene(*vk, rtr, 4 << 20, GetParam());
     const auto flags = VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV;
     std::vector<std::array<float, 6>> boxes;
     for (int i = 0; i < 300; i++) boxes.push_back({float(i), 0, 0, i + 0.5f, 1, 1});
@@ -167,15 +174,15 @@ TEST_F(CopyTest, RefitOfInstancesAndBoxes) {
     check_structure(scene, leaf, bottom_facts);
     check_structure(scene, top, top_facts);
     EXPECT_EQ(scene.words(top)[RTC_HDR_FACTS],
-              RTC_FACT_HAS_AABBS | RTC_FACT_IDENTITY_TRANSFORMS * 0 | RTC_FACT_NO_INSTANCE_FLAGS);
+              (GetParam() ? RTC_FACT_ADDRESSES : 0u) | RTC_FACT_HAS_AABBS | RTC_FACT_IDENTITY_TRANSFORMS * 0 | RTC_FACT_NO_INSTANCE_FLAGS);
     EXPECT_EQ(scene.words(top)[RTC_HDR_FIRST_OFFENDER], 0u);  // not opaque
     const float* lo = reinterpret_cast<const float*>(scene.words(top) + RTC_HDR_BOUNDS_MIN);
     EXPECT_LE(lo[2], -10);
 }
 
 // A structure may be built, and then updated, with less than it was created for.
-TEST_F(CopyTest, FewerThanCreatedFor) {
-    Scene scene(*vk, rtr, 1 << 20);
+TEST_P(CopyTest, FewerThanCreatedFor) {
+    Scene scene(*vk, rtr, 1 << 20, GetParam());
     const auto flags = VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV;
     auto vertices = ball(100, 1, 1);
     std::vector<VkGeometryNV> geometry{scene.triangles(vertices)};
@@ -200,8 +207,8 @@ TEST_F(CopyTest, FewerThanCreatedFor) {
     vk->destroy(scratch);
 }
 
-TEST_F(CopyTest, WrongUsesAreNamed) {
-    Scene scene(*vk, rtr, 1 << 20);
+TEST_P(CopyTest, WrongUsesAreNamed) {
+    Scene scene(*vk, rtr, 1 << 20, GetParam());
     auto vertices = ball(10, 1, 1);
     std::vector<VkGeometryNV> geometry{scene.triangles(vertices)};
     auto as = scene.build_bottom(geometry);
@@ -259,7 +266,12 @@ TEST_F(CopyTest, WrongUsesAreNamed) {
     expect("compacted-size");
 }
 
-TEST_F(CopyTest, HeapRanges) {
+INSTANTIATE_TEST_SUITE_P(Modes, CopyTest, ::testing::Bool(),
+                         [](const auto& info) { return info.param ? "Address" : "Heap"; });
+
+class HeapTest : public RuntimeTest {};
+
+TEST_F(HeapTest, Ranges) {
     Scene scene(*vk, rtr, 4096);
     VkDeviceSize a, b, c, d;
     ASSERT_EQ(rtrAllocateHeapRange(scene.heap, 1000, 0, &a), VK_SUCCESS);

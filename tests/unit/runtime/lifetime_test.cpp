@@ -85,7 +85,7 @@ TEST_F(LifetimeTest, AllocationsGoThroughTheCallbacks) {
         create.info.type = VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV;
         RtrAccelerationStructure as = nullptr;
         ASSERT_EQ(rtrCreateAccelerationStructure(device, &create, a, &as), VK_SUCCESS);
-        RtrBindAccelerationStructureMemoryInfo bind{nullptr, as, heap, at};
+        RtrBindAccelerationStructureMemoryInfo bind{nullptr, as, heap, at, VK_NULL_HANDLE, 0};
         ASSERT_EQ(rtrBindAccelerationStructureMemory(device, 1, &bind), VK_SUCCESS);
         // Many builds: the recorder's pools grow.
         Buffer scratch = vk->buffer(1 << 16, RTR_SCRATCH_BUFFER_USAGE);

@@ -1,8 +1,13 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
+#ifdef ADDRESS_MODE
+#extension GL_EXT_buffer_reference : require
+#extension GL_EXT_buffer_reference_uvec2 : require
+#endif
 // A hand-written "linked module": closest hit of a list of rays through both levels,
 // exactly as abi.h lays structures out. Boxes are tested generously; triangles by
-// Moeller-Trumbore in the order of the slots.
+// Moeller-Trumbore in the order of the slots. With ADDRESS_MODE defined structures are
+// read by their device addresses, and no heap is declared.
 #define RESERVED_SET 1
 #define RESERVED_BINDING 0
 #include "reserved_set.glsl"
@@ -12,6 +17,14 @@ layout(set = 0, binding = 0, std430) readonly buffer As { uint as_header[]; };
 layout(set = 0, binding = 1, std430) readonly buffer Rays { Ray rays[]; };
 layout(set = 0, binding = 2, std430) writeonly buffer Hits { uvec4 hits[]; };
 layout(push_constant) uniform Push { uint first_ray; };
+
+uvec2 block; // the structure that is being walked
+#ifdef ADDRESS_MODE
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Quads { uvec4 quads[]; };
+uvec4 quad(uint i) { return Quads(block).quads[i]; }
+#else
+uvec4 quad(uint i) { return heap_quad(block.x + i); }
+#endif
 
 float best;
 uvec4 hit; // t, instance, geometry, primitive
@@ -51,16 +64,17 @@ void main() {
     best = r.direction_tmax.w;
     hit = uvec4(0xffffffffu);
     vec3 wo = r.origin_tmin.xyz, wd = r.direction_tmax.xyz;
-    uint root = as_header[RTC_HDR_SELF_LO];
-    if (root != 0u && as_header[RTC_HDR_MAGIC] != RTC_AS_MAGIC) atomicAdd(control[RTC_CTRL_ERROR], 1u);
+    uvec2 root = uvec2(as_header[RTC_HDR_SELF_LO], as_header[RTC_HDR_SELF_HI]);
+    block = root;
+    if (root != uvec2(0u) && as_header[RTC_HDR_MAGIC] != RTC_AS_MAGIC) atomicAdd(control[RTC_CTRL_ERROR], 1u);
     uint stack[RTC_TRAVERSAL_STACK];
     uint top = 0u, bottom_mark = 0xffffffffu;
-    uint nodes = root + as_header[RTC_HDR_NODES], slots = root + as_header[RTC_HDR_SLOTS];
+    uint nodes = as_header[RTC_HDR_NODES], slots = as_header[RTC_HDR_SLOTS];
     uint top_nodes = nodes, top_slots = slots;
     bool in_top = as_header[RTC_HDR_KIND] == RTC_AS_KIND_TOP;
     uint instance = 0xffffffffu;
     vec3 o = wo, d = wd;
-    uint ref = root == 0u ? RTC_REF_EMPTY : 0u;
+    uint ref = root == uvec2(0u) ? RTC_REF_EMPTY : 0u;
     for (uint turn = 0u; turn < 60000u; turn++) {
         if ((ref & RTC_REF_LEAF) == 0u) {
             uvec4 q0 = quad(nodes + 4u * ref), q1 = quad(nodes + 4u * ref + 1u);
@@ -82,8 +96,9 @@ void main() {
                 o = vec3(dot(w0, vec4(wo, 1.0)), dot(w1, vec4(wo, 1.0)), dot(w2, vec4(wo, 1.0)));
                 d = vec3(dot(w0.xyz, wd), dot(w1.xyz, wd), dot(w2.xyz, wd));
                 instance = first;
-                nodes = q6.x + q7.z;
-                slots = q6.x + q7.y;
+                block = q6.xy;
+                nodes = q7.z;
+                slots = q7.y;
                 in_top = false;
                 bottom_mark = top;
                 ref = 0u;
@@ -93,6 +108,7 @@ void main() {
         }
         if (top == bottom_mark) { // the bottom level is done
             in_top = true;
+            block = root;
             nodes = top_nodes;
             slots = top_slots;
             o = wo;

@@ -8,15 +8,17 @@ layout(constant_id = 1901) const uint FETCH = RTC_FETCH_TEXEL;
 layout(constant_id = 1903) const uint STEP_BUDGET = 0xffffffffu;
 #define AT(b) set = RESERVED_SET, binding = RESERVED_BINDING + b
 layout(AT(RTC_BINDING_PARAMS), std140) uniform Params { uvec4 params[RTC_PARAM_QUADS]; };
+#ifndef ADDRESS_MODE
 layout(AT(RTC_BINDING_HEAP_TEXELS)) uniform usamplerBuffer heap_texels;
 layout(AT(RTC_BINDING_HEAP), std430) readonly buffer Heap { uvec4 heap[]; };
+uvec4 heap_quad(uint i) { return FETCH == RTC_FETCH_TEXEL ? texelFetch(heap_texels, int(i)) : heap[i]; }
+#endif
 layout(AT(RTC_BINDING_SBT_RAYGEN), std430) readonly buffer SbtRaygen { uint sbt_raygen[]; };
 layout(AT(RTC_BINDING_SBT_HIT), std430) readonly buffer SbtHit { uint sbt_hit[]; };
 layout(AT(RTC_BINDING_CONTROL), std430) buffer Control { uint control[]; };
 layout(AT(RTC_BINDING_SCRATCH), std430) buffer Scratch { uint scratch[]; };
 
 uint param(uint i) { return params[i / 4u][i % 4u]; }
-uvec4 quad(uint i) { return FETCH == RTC_FETCH_TEXEL ? texelFetch(heap_texels, int(i)) : heap[i]; }
 
 // Launch id of this lane, and whether it has one (abi.h, "Lanes").
 bool launch_id(out uint lane, out uvec3 id) {

@@ -4,18 +4,25 @@
 #include <cmath>
 #include <cstdlib>
 
-Scene::Scene(Vulkan& v, RtrDevice d, VkDeviceSize heap_size) : vk(v), rtr(d) {
-    heap_buffer = vk.buffer(heap_size, RTR_HEAP_BUFFER_USAGE);
-    RtrHeapCreateInfo info{};
-    info.buffer = heap_buffer.handle;
-    info.size = heap_buffer.size;
-    EXPECT_EQ(rtrCreateHeap(rtr, &info, nullptr, &heap), VK_SUCCESS);
+Scene::Scene(Vulkan& v, RtrDevice d, VkDeviceSize heap_size, bool address)
+    : vk(v), rtr(d), address_mode(address) {
+    heap_buffer = vk.buffer(heap_size, address ? RTR_ADDRESS_BUFFER_USAGE : RTR_HEAP_BUFFER_USAGE);
+    if (address) {
+        VkBufferDeviceAddressInfo info{VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO};
+        info.buffer = heap_buffer.handle;
+        address_ = vk.GetBufferDeviceAddress(vk.device, &info);
+    } else {
+        RtrHeapCreateInfo info{};
+        info.buffer = heap_buffer.handle;
+        info.size = heap_buffer.size;
+        EXPECT_EQ(rtrCreateHeap(rtr, &info, nullptr, &heap), VK_SUCCESS);
+    }
     control = vk.buffer(1 << 20, RTR_CONTROL_BUFFER_USAGE);
     RtrRecorderCreateInfo recorder_info{};
     recorder_info.controlBuffer = control.handle;
     recorder_info.controlSize = control.size;
     EXPECT_EQ(rtrCreateRecorder(rtr, &recorder_info, nullptr, &recorder), VK_SUCCESS);
-    run([&] { EXPECT_EQ(rtrCmdInitializeHeap(recorder, heap), VK_SUCCESS); });
+    if (heap) run([&] { EXPECT_EQ(rtrCmdInitializeHeap(recorder, heap), VK_SUCCESS); });
 }
 
 Scene::~Scene() {
@@ -89,15 +96,26 @@ RtrAccelerationStructure Scene::create(const VkAccelerationStructureInfoNV& info
     EXPECT_EQ(rtrCreateAccelerationStructure(rtr, &create, nullptr, &as), VK_SUCCESS);
     if (!as) return nullptr;
     structures_.push_back(as);
+    bind(as);
+    return as;
+}
+
+void Scene::bind(RtrAccelerationStructure as) {
     VkMemoryRequirements2 need{VK_STRUCTURE_TYPE_MEMORY_REQUIREMENTS_2};
     rtrGetAccelerationStructureMemoryRequirements(
         rtr, VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_OBJECT_NV, as, &need);
     RtrBindAccelerationStructureMemoryInfo bind{};
     bind.accelerationStructure = as;
-    bind.heap = heap;
-    EXPECT_EQ(rtrAllocateHeapRange(heap, need.memoryRequirements.size, 0, &bind.heapOffset), VK_SUCCESS);
+    if (address_mode) {
+        bind.buffer = heap_buffer.handle;
+        bind.bufferOffset = used_;
+        used_ += need.memoryRequirements.size;
+        EXPECT_LE(used_, heap_buffer.size);
+    } else {
+        bind.heap = heap;
+        EXPECT_EQ(rtrAllocateHeapRange(heap, need.memoryRequirements.size, 0, &bind.heapOffset), VK_SUCCESS);
+    }
     EXPECT_EQ(rtrBindAccelerationStructureMemory(rtr, 1, &bind), VK_SUCCESS);
-    return as;
 }
 
 VkDeviceSize Scene::scratch_size(RtrAccelerationStructure as, bool update) const {
@@ -159,7 +177,11 @@ uint64_t Scene::handle(RtrAccelerationStructure as) const {
 }
 
 const uint32_t* Scene::words(RtrAccelerationStructure as) const {
-    return heap_buffer.as<uint32_t>(handle(as) * RTC_QUAD_BYTES);
+    return block(handle(as));
+}
+
+const uint32_t* Scene::block(uint64_t handle) const {
+    return heap_buffer.as<uint32_t>(address_mode ? handle - address_ : handle * RTC_QUAD_BYTES);
 }
 
 VkAccelerationStructureInstanceNV Scene::instance(RtrAccelerationStructure as) const {
@@ -295,7 +317,7 @@ class Walker {
         const uint32_t* r = slots_ + 32 * i;
         const float* m = reinterpret_cast<const float*>(r + 12);
         uint64_t base = r[24] | uint64_t(r[25]) << 32;
-        const uint32_t* blas = scene_.heap_buffer.as<uint32_t>(base * 16);
+        const uint32_t* blas = scene_.block(base);
         EXPECT_EQ(blas[RTC_HDR_MAGIC], RTC_AS_MAGIC);
         EXPECT_EQ(r[28], blas[RTC_HDR_FACTS]);
         EXPECT_EQ(r[29], blas[RTC_HDR_SLOTS]);

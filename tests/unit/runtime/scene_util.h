@@ -18,10 +18,11 @@ struct BuiltStructure {
     VkDeviceSize size = 0;
 };
 
-// Owns a heap, a recorder and the structures of a test.
+// Owns a heap, a recorder and the structures of a test. In address mode the "heap" is a
+// buffer without an RtrHeap, whose ranges are given out one after the other.
 class Scene {
   public:
-    Scene(Vulkan& vk, RtrDevice rtr, VkDeviceSize heap_size);
+    Scene(Vulkan& vk, RtrDevice rtr, VkDeviceSize heap_size, bool address_mode = false);
     ~Scene();
 
     VkGeometryNV triangles(const std::vector<Vec3>& vertices, const std::vector<uint32_t>* indices = nullptr,
@@ -37,6 +38,9 @@ class Scene {
     uint64_t handle(RtrAccelerationStructure as) const;
     VkDeviceSize scratch_size(RtrAccelerationStructure as, bool update = false) const;
     const uint32_t* words(RtrAccelerationStructure as) const;  // of the block, in the mapped heap
+    const uint32_t* block(uint64_t handle) const;
+    // Binds to the next free range.
+    void bind(RtrAccelerationStructure as);
     Buffer upload(const void* data, size_t size);
     void run(const std::function<void()>& record);  // begin, record, submit
 
@@ -46,8 +50,11 @@ class Scene {
     RtrHeap heap = nullptr;
     RtrRecorder recorder = nullptr;
     Buffer control;
+    bool address_mode;
 
   private:
+    VkDeviceAddress address_ = 0;
+    VkDeviceSize used_ = 0;
     std::vector<RtrAccelerationStructure> structures_;
     std::vector<Buffer> buffers_;
 };

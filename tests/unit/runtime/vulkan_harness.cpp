@@ -113,10 +113,25 @@ std::unique_ptr<Vulkan> Vulkan::create(std::string& why) {
     VkDeviceCreateInfo device{VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO};
     device.queueCreateInfoCount = 1;
     device.pQueueCreateInfos = &queue;
+    // Address mode where the device has it. The instance is one of Vulkan 1.1, so it is an extension.
+    RtrPhysicalDeviceSupport support;
+    rtrGetPhysicalDeviceSupport(v->instance, v->physical_device, v->get_instance_proc_addr, &support);
+    const char* address_extension = "VK_KHR_buffer_device_address";
+    VkPhysicalDeviceBufferDeviceAddressFeatures address{
+        VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_BUFFER_DEVICE_ADDRESS_FEATURES};
+    address.bufferDeviceAddress = VK_TRUE;
+    if (support.addressMode && !getenv("RTC_TEST_NO_ADDRESSES")) {
+        device.pNext = &address;
+        device.enabledExtensionCount = 1;
+        device.ppEnabledExtensionNames = &address_extension;
+    }
     if (v->CreateDevice(v->physical_device, &device, nullptr, &v->device) != VK_SUCCESS) {
         why = "vkCreateDevice failed";
         return nullptr;
     }
+    if (device.pNext)
+        v->GetBufferDeviceAddress = reinterpret_cast<PFN_vkGetBufferDeviceAddress>(
+            v->get_instance_proc_addr(v->instance, "vkGetBufferDeviceAddressKHR"));
     v->GetDeviceQueue(v->device, v->queue_family, 0, &v->queue);
     VkCommandPoolCreateInfo pool{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
     pool.queueFamilyIndex = v->queue_family;
@@ -155,6 +170,9 @@ Buffer Vulkan::buffer(VkDeviceSize size, VkBufferUsageFlags usage) {
     GetPhysicalDeviceMemoryProperties(physical_device, &memory);
     VkMemoryAllocateInfo allocate{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO};
     allocate.allocationSize = need.size;
+    VkMemoryAllocateFlagsInfo address{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO};
+    address.flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT;
+    if (usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT) allocate.pNext = &address;
     const VkMemoryPropertyFlags flags =
         VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
     for (uint32_t i = memory.memoryTypeCount; i-- > 0;) {
@@ -234,6 +252,7 @@ void RuntimeTest::SetUp() {
         info.pfnGetInstanceProcAddr = vk->get_instance_proc_addr;
         auto messenger = vk->messenger_info(true);
         info.pMessenger = &messenger;
+        info.bufferDeviceAddress = vk->GetBufferDeviceAddress != nullptr;
         ASSERT_EQ(rtrCreateDevice(&info, nullptr, &shared_device), VK_SUCCESS);
     }
     rtr = shared_device;

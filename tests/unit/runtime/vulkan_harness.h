@@ -60,6 +60,7 @@ class Vulkan {
     VkCommandPool pool = VK_NULL_HANDLE;
     VkCommandBuffer cmd = VK_NULL_HANDLE;
     bool validation = false;
+    PFN_vkGetBufferDeviceAddress GetBufferDeviceAddress = nullptr;  // null: no address mode here
     std::vector<std::string> layer_messages;    // from the validation layers
     std::vector<std::string> runtime_messages;  // from the runtime: "id: text"
 
