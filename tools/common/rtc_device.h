@@ -58,9 +58,9 @@ class RtcScene {
 // A compiled job with its descriptors and shader binding table, ready to be launched many times.
 class RtcLauncher {
   public:
-    // The job's buffers and images must outlive the launcher.
+    // The job's buffers and images must outlive the launcher. `options` null: as the device recommends.
     RtcLauncher(const RtcDevice& device, const RtcScene& scene, const RayTracingJob& job,
-                const std::vector<uint32_t>& module);
+                const std::vector<uint32_t>& module, const RtrTraceOptions* options = nullptr);
     ~RtcLauncher();
     RtcLauncher(const RtcLauncher&) = delete;
     RtcLauncher& operator=(const RtcLauncher&) = delete;

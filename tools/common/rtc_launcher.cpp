@@ -23,7 +23,7 @@ std::vector<RtrSbtRecord> convert(const std::vector<JobRecord>& records) {
 }  // namespace
 
 RtcLauncher::RtcLauncher(const RtcDevice& device, const RtcScene& scene, const RayTracingJob& job,
-                         const std::vector<uint32_t>& module)
+                         const std::vector<uint32_t>& module, const RtrTraceOptions* options)
     : device_(device), extent_{job.width, job.height, job.depth} {
     descriptors_ = std::make_unique<JobDescriptors>(
         device.context, job.bindings, VK_SHADER_STAGE_COMPUTE_BIT, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
@@ -48,6 +48,7 @@ RtcLauncher::RtcLauncher(const RtcDevice& device, const RtcScene& scene, const R
     info.pSetLayouts = descriptors_->layouts.data();
     info.pushConstantRangeCount = range.size ? 1 : 0;
     info.pPushConstantRanges = &range;
+    info.pOptions = options;
     device.check(rtrCreateRayTracingPipeline(device.handle, VK_NULL_HANDLE, &info, nullptr, &pipeline_),
                  "rtrCreateRayTracingPipeline");
     create_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
