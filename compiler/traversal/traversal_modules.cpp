@@ -9,25 +9,17 @@ constexpr uint32_t kWatertight[] = {
 constexpr uint32_t kFast[] = {
 #include "traversal_fast.inc"
 };
-constexpr uint32_t kWatertightAddress[] = {
-#include "traversal_watertight_address.inc"
-};
-constexpr uint32_t kFastAddress[] = {
-#include "traversal_fast_address.inc"
-};
 
 constexpr TraversalModule kModules[] = {
-    {"watertight", false, kWatertight, std::size(kWatertight)},
-    {"watertight", true, kWatertightAddress, std::size(kWatertightAddress)},
-    {"fast", false, kFast, std::size(kFast)},
-    {"fast", true, kFastAddress, std::size(kFastAddress)},
+    {"watertight", kWatertight, std::size(kWatertight)},
+    {"fast", kFast, std::size(kFast)},
 };
 
 }  // namespace
 
-const TraversalModule* find_traversal_module(std::string_view tier, bool addresses) {
+const TraversalModule* find_traversal_module(std::string_view tier) {
     for (const TraversalModule& module : kModules) {
-        if (tier == module.name && addresses == module.addresses) return &module;
+        if (tier == module.name) return &module;
     }
     return nullptr;
 }

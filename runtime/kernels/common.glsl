@@ -1,5 +1,7 @@
 // Declarations shared by the build kernels: one pipeline layout for all of them,
 // each kernel uses the bindings it names.
+// Combined with a sampler, buffer images are an error from SPIR-V 1.6 on and a warning of the layers before.
+#extension GL_EXT_samplerless_texture_functions : require
 #define RTR_GLSL 1
 #include "rtc/abi.h"
 #include "build_shared.h"
@@ -14,7 +16,7 @@ layout(set = 0, binding = RTR_IN_TRANSFORM, std430) readonly buffer InTransform 
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Quads { uvec4 quads[]; };
 uvec4 block_quad(uint base_lo, uint base_hi, uint quad) { return Quads(uvec2(base_lo, base_hi)).quads[quad]; }
 #else
-layout(set = 0, binding = RTR_IN_HEAP) uniform usamplerBuffer in_heap;
+layout(set = 0, binding = RTR_IN_HEAP) uniform utextureBuffer in_heap;
 // A texel index has 31 bits; heaps are smaller than 2^31 quads.
 uvec4 block_quad(uint base_lo, uint base_hi, uint quad) { return texelFetch(in_heap, int(base_lo + quad)); }
 #endif

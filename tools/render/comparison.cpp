@@ -28,6 +28,7 @@ Comparison compare(const RenderResult& a, const RenderResult& b) {
         }
         result.within += worst <= 1e-3;
         result.largest = std::max(result.largest, worst);
+        result.differences.push_back(worst);
     }
     const double count = double(result.pixels);
     for (int c = 0; c < 3; ++c) {
@@ -71,6 +72,18 @@ std::string as_text(const Comparison& comparison) {
                   std::to_string(comparison.pixels) + " pixels\n";
     result += comparison.passed() ? "compare: passed\n" : "compare: FAILED\n";
     return result;
+}
+
+std::string as_json(const Comparison& comparison) {
+    char text[512];
+    std::snprintf(text, sizeof text,
+                  "{\"pixels\": %zu, \"within\": %zu, \"largest\": %.3g, \"mean_difference\": [%.3g, %.3g, %.3g], "
+                  "\"standard_error\": [%.3g, %.3g, %.3g], \"passed\": %s}",
+                  comparison.pixels, comparison.within, comparison.largest, comparison.mean_difference[0],
+                  comparison.mean_difference[1], comparison.mean_difference[2], comparison.standard_error[0],
+                  comparison.standard_error[1], comparison.standard_error[2],
+                  comparison.passed() ? "true" : "false");
+    return text;
 }
 
 }  // namespace rtc::tools

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "renderer.h"
 
@@ -15,6 +16,7 @@ struct Comparison {
     double largest = 0;             // relative difference
     size_t first_hits_differ = 0;   // pixels whose instance or primitive differ (last sample)
     bool has_first_hits = false;
+    std::vector<double> differences;  // relative, one a pixel
 
     // The bars of the comparison with native drivers: 99 % of pixels within, means within 3 standard errors.
     bool passed() const;
@@ -22,5 +24,6 @@ struct Comparison {
 
 Comparison compare(const RenderResult& a, const RenderResult& b);
 std::string as_text(const Comparison& comparison);
+std::string as_json(const Comparison& comparison);
 
 }  // namespace rtc::tools

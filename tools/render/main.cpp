@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 
 #include <cstdio>
+#include <fstream>
 
 #include "demo.h"
 #include "error.h"
@@ -9,6 +10,7 @@
 #include "renderer.h"
 #ifdef RTC_RENDER_NATIVE
 #include "comparison.h"
+#include "recorded.h"
 #include "native_renderer.h"
 #endif
 
@@ -26,8 +28,8 @@ struct Arguments {
     std::string scene = "builtin:cornell", integrator = "path", dialect = "nv", device, output, demo_folder;
     std::vector<float> eye, target;
     float field_of_view = 0, exposure = 1;
-    std::string native;
-    bool validate = false, demo = false, compare = false;
+    std::string native, json;
+    bool validate = false, demo = false, compare = false, classify = false;
     RenderOptions render;
 };
 
@@ -54,6 +56,13 @@ Scene scene_of(const Arguments& arguments) {
 }
 
 #ifdef RTC_RENDER_NATIVE
+void write_text(const std::string& path, const std::string& text) {
+    std::ofstream file(path, std::ios::binary);
+    file << text;
+    file.close();
+    if (!file) throw Error("cannot write " + path);
+}
+
 // The device's own ray tracing alone, or beside rtc on the same device with the same shaders.
 int draw_natively(Arguments& arguments) {
     const bool khr = arguments.native == "khr";
@@ -76,6 +85,19 @@ int draw_natively(Arguments& arguments) {
         const Comparison comparison = compare(peer, ours);
         std::printf("%s", as_text(comparison).c_str());
         passed = comparison.passed();
+        std::string report = "{\"scene\": \"" + scene.name + "\", \"integrator\": \"" + arguments.integrator +
+                             "\", \"native\": \"" + arguments.native + "\", \"device\": \"" +
+                             describe_device(context.properties, context.driver) + "\", \"width\": " +
+                             std::to_string(render_options.settings.width) + ", \"height\": " +
+                             std::to_string(render_options.settings.height) + ", \"launches\": " +
+                             std::to_string(render_options.samples) + ",\n \"pictures\": " + as_json(comparison);
+        if (arguments.classify) {
+            const Recorded recorded = compare_recorded(device, scene, render_options);
+            std::printf("%s", recorded.text.c_str());
+            passed = passed && recorded.passed;
+            report += ",\n " + recorded.json;
+        }
+        if (!arguments.json.empty()) write_text(arguments.json, report + "}\n");
         save(arguments, ours);
     } else {
         save(arguments, peer);
@@ -149,6 +171,10 @@ int main(int argc, char** argv) {
     app.add_option("--native", arguments.native, "draw with the device's own extension: nv or khr")
         ->check(CLI::IsMember({"nv", "khr"}));
     app.add_flag("--compare", arguments.compare, "with --native: draw with rtc too and compare");
+    app.add_flag("--classify", arguments.classify,
+                 "with --compare: record every ray on both sides and judge the first that parts by exact "
+                 "arithmetic");
+    app.add_option("--json", arguments.json, "with --compare: write the figures to this file");
     app.add_flag("--demo", arguments.demo, "draw the three demo pictures");
     app.add_option("--out-dir", arguments.demo_folder, "where --demo writes")->default_str("out/demo");
     CLI11_PARSE(app, argc, argv);
@@ -158,6 +184,8 @@ int main(int argc, char** argv) {
             throw Error("-o FILE, --compare or --demo is needed");
         if (!arguments.output.empty() && !can_write_picture(arguments.output))
             throw Error(arguments.output + ": pictures are written as .png, .exr or .pfm");
+        if (arguments.classify && !arguments.compare) throw Error("--classify needs --compare");
+        if (!arguments.json.empty() && !arguments.compare) throw Error("--json needs --compare");
         if (arguments.compare && arguments.native.empty()) throw Error("--compare needs --native=nv or khr");
         render.settings.integrator = integrator_from_name(arguments.integrator);
         render.settings.ext_dialect = arguments.dialect == "ext";

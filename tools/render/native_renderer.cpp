@@ -16,9 +16,11 @@ double seconds_since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
+}  // namespace
+
 // One pass on an executor of its own; each builds the scene for itself.
-struct NativePass {
-    NativePass(const Context& context, const RayTracingJob& job, const native::World& world, bool khr,
+struct NativePasses::Pass {
+    Pass(const Context& context, const RayTracingJob& job, const native::World& world, bool khr,
                RenderResult& result)
         : executor(khr ? native::make_khr(context) : native::make_nv(context)) {
         Clock::time_point start = Clock::now();
@@ -28,6 +30,7 @@ struct NativePass {
             source.text = native::read_text(shader.file);
             source.file = shader.file;
             source.stage = shader.stage;
+            source.defines = shader.defines;
             shader.spirv = native::compile_glsl(source);
         }
         result.compile_seconds += seconds_since(start);
@@ -52,29 +55,39 @@ struct NativePass {
     native::Launch launch;
 };
 
-}  // namespace
+NativePasses::NativePasses(const Context& context, const Scene& scene, const RenderJob& job, bool khr,
+                           RenderResult& result)
+    : context_(context), job_(job) {
+    const native::World world = native::world_of(scene);
+    for (const RayTracingJob& pass : job.passes)
+        passes_.push_back(std::make_unique<Pass>(context, pass, world, khr, result));
+}
+
+NativePasses::~NativePasses() = default;
+
+const char* NativePasses::name() const { return passes_[0]->executor->name(); }
+
+void NativePasses::launch(uint32_t sample) {
+    context_.run([&](VkCommandBuffer commands) {
+        if (job_.log_places) job_.clear_log(commands);
+        for (const auto& pass : passes_) {
+            pass->launch.push_constants = job_.push_constants(sample);
+            pass->executor->trace(commands, pass->launch);
+            full_barrier(commands);
+        }
+    });
+}
 
 RenderResult render_natively(const Context& context, const Scene& scene, const RenderOptions& options) {
     RenderResult result;
     RenderJob job(context, scene, options.settings);
-    const native::World world = native::world_of(scene);
-    std::vector<std::unique_ptr<NativePass>> passes;
-    for (const RayTracingJob& pass : job.passes)
-        passes.push_back(
-            std::make_unique<NativePass>(context, pass, world, options.settings.ext_dialect, result));
+    NativePasses passes(context, scene, job, options.settings.ext_dialect, result);
 
-    Progress progress(std::string("tracing with ") + passes[0]->executor->name(), options.samples,
-                      options.quiet);
+    Progress progress(std::string("tracing with ") + passes.name(), options.samples, options.quiet);
     const Clock::time_point start = Clock::now();
     double rays_per_sample = 0;
     for (uint32_t sample = 0; sample < options.samples; ++sample) {
-        context.run([&](VkCommandBuffer commands) {
-            for (const auto& pass : passes) {
-                pass->launch.push_constants = job.push_constants(sample);
-                pass->executor->trace(commands, pass->launch);
-                full_barrier(commands);
-            }
-        });
+        passes.launch(sample);
         if (rays_per_sample == 0) rays_per_sample = job.rays(context);
         progress.update(sample + 1, rays_per_sample * (sample + 1));
     }

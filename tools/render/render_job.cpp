@@ -15,6 +15,7 @@ namespace rtc::tools {
 namespace {
 
 constexpr uint32_t kMaxTextureSize = 1024;
+constexpr uint64_t kLogRecordBytes = 48;  // trace_log.glsl
 
 struct LaunchBlock {
     uint32_t sample_index;
@@ -103,6 +104,7 @@ RenderJob::RenderJob(const Context& context, const Scene& scene, const RenderSet
     desc.format = VK_FORMAT_R32G32B32A32_UINT;
     gbuffer = Image(context, desc);
 
+    if (settings.log_rays) make_log(context);
     switch (settings.integrator) {
         case Integrator::Path:
             add_pass(folder, "primary.rgen", "hit.rchit", "miss.rmiss", 1, false);
@@ -188,6 +190,44 @@ void RenderJob::upload_textures(const Context& context, const Scene& scene) {
     check(vkCreateSampler(context.device, &info, nullptr, &sampler_.handle), "vkCreateSampler");
 }
 
+// A record for every ray that a pixel can trace in one launch.
+void RenderJob::make_log(const Context& context) {
+    switch (settings.integrator) {
+        case Integrator::Path:
+            log_places = 1 + 2 * settings.max_bounces;
+            break;
+        case Integrator::Reflections:
+            log_places = 2 * (8 + 1);
+            break;
+        case Integrator::Shadows:
+            log_places = 1 + std::max(1u, settings.shadow_samples);
+            break;
+        case Integrator::AmbientOcclusion:
+            log_places = 1 + std::max(1u, settings.ao_samples);
+            break;
+        case Integrator::Primary:
+            log_places = 1;
+            break;
+    }
+    const uint64_t pixel_bytes = uint64_t(settings.width) * settings.height * kLogRecordBytes;
+    const uint64_t limit = context.properties.limits.maxStorageBufferRange;
+    if (pixel_bytes * log_places > limit)
+        throw Error("a record of " + std::to_string(log_places) + " rays a pixel takes " +
+                    std::to_string(pixel_bytes * log_places >> 20) +
+                    " MiB, the device's maxStorageBufferRange is " + std::to_string(limit >> 20) +
+                    " MiB; draw a smaller picture, or fewer --max-bounces (" +
+                    std::to_string(limit / pixel_bytes / 2) + " fit)");
+    ray_log = Buffer(context, pixel_bytes * log_places,
+                     VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
+                         VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+                     MemoryKind::Device);
+}
+
+void RenderJob::clear_log(VkCommandBuffer commands) const {
+    vkCmdFillBuffer(commands, ray_log.handle, 0, VK_WHOLE_SIZE, 0);
+    full_barrier(commands);
+}
+
 void RenderJob::add_pass(const std::string& folder, const char* raygen, const char* closest_hit,
                          const char* miss, uint32_t recursion, bool shadows) {
     RayTracingJob job;
@@ -196,6 +236,7 @@ void RenderJob::add_pass(const std::string& folder, const char* raygen, const ch
         shader.stage = stage;
         shader.name = file;
         shader.file = folder + file;
+        if (log_places) shader.defines = {"RTC_TRACE_LOG=" + std::to_string(log_places)};
         job.pipeline.shaders.push_back(shader);
         return int(job.pipeline.shaders.size() - 1);
     };
@@ -240,6 +281,13 @@ void RenderJob::add_pass(const std::string& folder, const char* raygen, const ch
                     frame,
                     image_binding(1, accumulation),
                     image_binding(2, gbuffer)};
+    if (log_places) {
+        JobBinding log;
+        log.set = 1;
+        log.binding = 3;
+        log.buffers = {{ray_log.handle, 0, VK_WHOLE_SIZE}};
+        job.bindings.push_back(log);
+    }
     job.push_constants = push_constants(0);
     job.width = settings.width;
     job.height = settings.height;

@@ -28,6 +28,7 @@ struct RenderSettings {
     float ao_radius = 0;          // 0: a quarter of the scene's diagonal
     bool ext_dialect = false;     // the GL_EXT_ray_tracing twins
     std::string shader_folder;    // empty: default_shader_folder()
+    bool log_rays = false;        // RenderJob::ray_log
 };
 
 // $RTC_SHADERS, share/rtc/shaders/render of the installation, or the source tree's. Throws Error.
@@ -44,6 +45,11 @@ class RenderJob {
 
     Image accumulation;  // sum of radiance; w: rays traced
     Image gbuffer;       // instance, primitive, barycentrics as bits
+    // With settings.log_rays: log_places records a pixel, as trace_log.glsl describes them.
+    Buffer ray_log;
+    uint32_t log_places = 0;
+    // Makes all records empty; to be recorded before a sample's passes.
+    void clear_log(VkCommandBuffer commands) const;
 
     // The mean of `samples` launches, alpha 1.
     Picture picture(const Context& context, uint32_t samples) const;
@@ -52,6 +58,7 @@ class RenderJob {
   private:
     void upload_tables(const Context& context, const Scene& scene);
     void upload_textures(const Context& context, const Scene& scene);
+    void make_log(const Context& context);
     void add_pass(const std::string& folder, const char* raygen, const char* closest_hit, const char* miss,
                   uint32_t recursion, bool shadows);
 

@@ -48,40 +48,57 @@ std::vector<std::vector<uint32_t>> get_modules(const RtcDevice& device, const Re
     return modules;
 }
 
-}  // namespace
-
-RenderResult render(const RtcDevice& device, const Scene& scene, const RenderOptions& options) {
-    const Context& context = device.context;
-    RenderResult result;
+void warn_of_holes(const Scene& scene) {
     for (const Material& material : scene.materials)
         if (material.alpha_tested) {
             std::fprintf(stderr,
                          "rtc-render: warning: material '%s' has holes (alphaMode MASK); it is drawn solid\n",
                          material.name.c_str());
-            break;
+            return;
         }
-    RenderJob job(context, scene, options.settings);
+}
+
+}  // namespace
+
+RtcPasses::RtcPasses(const RtcDevice& device, const Scene& scene, const RenderJob& job,
+                     const RenderOptions& options, RenderResult& result)
+    : context_(device.context), job_(job), structures_(device, scene, options.fast_build) {
     const std::vector<std::vector<uint32_t>> modules =
         get_modules(device, job, options, result.compile_seconds);
-    RtcScene structures(device, scene, options.fast_build);
-    result.build_seconds = structures.build_seconds;
+    result.build_seconds = structures_.build_seconds;
     if (!options.quiet)
         std::printf(
             "scene: %s, %zu triangles in %zu meshes, %zu instances; acceleration structures %.1f MiB in %.2f "
             "s\n",
             scene.name.c_str(), scene.triangle_count(), scene.meshes.size(), scene.instances.size(),
-            double(structures.bytes) / 1048576.0, structures.build_seconds);
-
-    std::vector<std::unique_ptr<RtcLauncher>> launchers;
+            double(structures_.bytes) / 1048576.0, structures_.build_seconds);
     for (size_t i = 0; i < job.passes.size(); ++i) {
-        launchers.push_back(std::make_unique<RtcLauncher>(device, structures, job.passes[i], modules[i]));
+        launchers_.push_back(std::make_unique<RtcLauncher>(device, structures_, job.passes[i], modules[i]));
         if (!options.quiet) {
-            const RtrPipelineInfo info = launchers.back()->info();
+            const RtrPipelineInfo info = launchers_.back()->info();
             std::printf("pass: %s, %u states, recursion %u, %zu KiB of SPIR-V\n",
                         job.passes[i].pipeline.shaders[0].name.c_str(), info.stateCount,
                         info.maxRecursionDepth, modules[i].size() * 4 / 1024);
         }
     }
+}
+
+void RtcPasses::launch(uint32_t first, uint32_t count) {
+    context_.run([&](VkCommandBuffer commands) {
+        for (uint32_t sample = first; sample < first + count; ++sample) {
+            if (job_.log_places) job_.clear_log(commands);
+            for (const auto& launcher : launchers_) launcher->record(commands, job_.push_constants(sample));
+        }
+    });
+    for (const auto& launcher : launchers_) launcher->finish();
+}
+
+RenderResult render(const RtcDevice& device, const Scene& scene, const RenderOptions& options) {
+    const Context& context = device.context;
+    RenderResult result;
+    warn_of_holes(scene);
+    RenderJob job(context, scene, options.settings);
+    RtcPasses passes(device, scene, job, options, result);
 
     Progress progress("tracing", options.samples, options.quiet);
     const Clock::time_point start = Clock::now();
@@ -90,17 +107,13 @@ RenderResult render(const RtcDevice& device, const Scene& scene, const RenderOpt
     while (done < options.samples) {
         const uint32_t count = std::min(batch, options.samples - done);
         const Clock::time_point batch_start = Clock::now();
-        context.run([&](VkCommandBuffer commands) {
-            for (uint32_t sample = done; sample < done + count; ++sample)
-                for (const auto& launcher : launchers) launcher->record(commands, job.push_constants(sample));
-        });
-        for (const auto& launcher : launchers) launcher->finish();
+        passes.launch(done, count);
         done += count;
         if (rays_per_sample == 0) rays_per_sample = job.rays(context);  // later samples trace about as many
         progress.update(done, rays_per_sample * done);
         // Batches of about half a second keep the bar moving and the queue busy.
         const double took = seconds_since(batch_start) / count;
-        batch = std::clamp(uint32_t(0.5 / std::max(took, 1e-3)), 1u, launchers[0]->max_launches());
+        batch = std::clamp(uint32_t(0.5 / std::max(took, 1e-3)), 1u, passes.max_launches());
     }
     result.trace_seconds = seconds_since(start);
     result.rays = job.rays(context);

@@ -28,6 +28,23 @@ struct RenderResult {
     double rays = 0, trace_seconds = 0, compile_seconds = 0, build_seconds = 0;
 };
 
+// The passes of a job compiled, with their acceleration structures: whatever launches samples.
+class RtcPasses {
+  public:
+    // `job` and `device` must outlive the passes. Times go to `result`.
+    RtcPasses(const RtcDevice& device, const Scene& scene, const RenderJob& job, const RenderOptions& options,
+              RenderResult& result);
+    // Launches `count` samples, at most max_launches(), and waits. Throws Error for a launch that failed.
+    void launch(uint32_t first, uint32_t count);
+    uint32_t max_launches() const { return launchers_[0]->max_launches(); }
+
+  private:
+    const Context& context_;
+    const RenderJob& job_;
+    RtcScene structures_;
+    std::vector<std::unique_ptr<RtcLauncher>> launchers_;
+};
+
 // `device` may be shared by several pictures.
 RenderResult render(const RtcDevice& device, const Scene& scene, const RenderOptions& options);
 

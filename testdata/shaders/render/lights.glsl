@@ -8,7 +8,7 @@
 
 // Emitter i: 4 texels from 4 i: v0 and the alias table's threshold; edge 1 and alias index; edge 2 and
 // luminance; emission and 1.0 when both sides emit. Then 2 texels a point light: position, intensity.
-layout(set = 0, binding = 5) uniform samplerBuffer lights;
+layout(set = 0, binding = 5) uniform textureBuffer lights;
 
 struct LightSample {
     vec3 direction;  // unit, from the surface to the light

@@ -8,6 +8,7 @@
 #include "lights.glsl"
 #include "brdf.glsl"
 #include "reflections.glsl"
+#include "trace_log.glsl"
 
 layout(set = 0, binding = 0) uniform accelerationStructureNV scene;
 layout(location = 0) rayPayloadInNV Radiance incoming;
@@ -18,7 +19,8 @@ hitAttributeNV vec2 barycentrics;
 void main() {
     vec3 direction = gl_WorldRayDirectionNV;
     uvec4 hit = uvec4(gl_InstanceCustomIndexNV, gl_PrimitiveID, floatBitsToUint(barycentrics));
-    Surface surface = fetch_surface(hit, direction);
+    LOG_RAY(gl_LaunchIDNV.xy, gl_LaunchSizeNV.x, 2u * incoming.depth, kLogClosest, gl_WorldRayOriginNV, direction, kRayMax, hit);
+    Surface surface = fetch_surface(hit, gl_WorldRayOriginNV, direction);
     vec3 ambient = 0.15 * mix(frame.sky_low.rgb, frame.sky_high.rgb, 0.5 + 0.5 * surface.ns.y);
     vec3 color = surface.emission + surface.base_color * ambient * (1.0 - surface.metallic);
 
@@ -27,8 +29,11 @@ void main() {
     vec3 value = evaluate_brdf(surface, -direction, light.direction, pdf) * light.radiance;
     if (max(value.r, max(value.g, value.b)) > 0.0) {
         visibility = 0.0;
+        vec3 start = spawn_point(surface, light.direction);
+        float end = light.distance * 0.9999;
         traceNV(scene, gl_RayFlagsTerminateOnFirstHitNV | gl_RayFlagsSkipClosestHitShaderNV, 0xff, 0, 0, 1,
-                spawn_point(surface, light.direction), 0.0, light.direction, light.distance * 0.9999, 1);
+                start, 0.0, light.direction, end, 1);
+        LOG_RAY(gl_LaunchIDNV.xy, gl_LaunchSizeNV.x, 2u * incoming.depth + 1u, kLogShadow, start, light.direction, end, uvec4(visibility != 0.0));
         incoming.rays += 1.0;
         color += value * visibility;
     }

@@ -2,16 +2,18 @@
 #ifndef SURFACE_GLSL
 #define SURFACE_GLSL
 
+#extension GL_EXT_samplerless_texture_functions : require
+
 // Texel buffers rather than storage buffers: reads with an index per invocation are several times cheaper
 // in CPU drivers. Instances have 7 texels by custom index: 3 rows of the transform, 3 rows of its inverse
 // transpose, then the first triangle in the table and 1 when the mesh has normals.
-layout(set = 0, binding = 1) uniform samplerBuffer instances;
+layout(set = 0, binding = 1) uniform textureBuffer instances;
 // 2 texels: position and u, normal and v.
-layout(set = 0, binding = 2) uniform samplerBuffer vertices;
+layout(set = 0, binding = 2) uniform textureBuffer vertices;
 // The three vertices and the material.
-layout(set = 0, binding = 3) uniform usamplerBuffer triangles;
+layout(set = 0, binding = 3) uniform utextureBuffer triangles;
 // 3 texels: base colour and metallic; emission and roughness; texture layer or -1, 1 when both sides emit.
-layout(set = 0, binding = 4) uniform samplerBuffer materials;
+layout(set = 0, binding = 4) uniform textureBuffer materials;
 layout(set = 0, binding = 6) uniform sampler2DArray textures;
 
 struct Surface {
@@ -44,8 +46,28 @@ vec3 to_world(vec4 row0, vec4 row1, vec4 row2, vec3 p) {
     return world;
 }
 
-// `hit` as the closest-hit shader wrote it; `direction` of the ray that found it.
-Surface fetch_surface(uvec4 hit, vec3 direction) {
+// Where the ray crosses the triangle: the weights of p1 and p2 once more, after Moeller and Trumbore (1997).
+// Implementations may round a hit's barycentrics differently, and curved mirrors make a different picture
+// of one bit; taken from the ray in arithmetic that all must do alike, paths stay together. Edge-on, where
+// these are the worse ones, the given ones stay.
+vec2 crossing(vec3 p0, vec3 p1, vec3 p2, vec3 origin, vec3 d, vec2 given) {
+    precise vec3 e = p1 - p0, f = p2 - p0, s = origin - p0, p, q;
+    p.x = d.y * f.z - d.z * f.y;
+    p.y = d.z * f.x - d.x * f.z;
+    p.z = d.x * f.y - d.y * f.x;
+    q.x = s.y * e.z - s.z * e.y;
+    q.y = s.z * e.x - s.x * e.z;
+    q.z = s.x * e.y - s.y * e.x;
+    precise float determinant = e.x * p.x + e.y * p.y + e.z * p.z;
+    precise vec2 weights;
+    weights.x = (s.x * p.x + s.y * p.y + s.z * p.z) / determinant;
+    weights.y = (d.x * q.x + d.y * q.y + d.z * q.z) / determinant;
+    // NaN is no less.
+    return all(lessThan(abs(weights - given), vec2(1e-3))) ? weights : given;
+}
+
+// `hit` as the closest-hit shader wrote it; `origin` and `direction` of the ray that found it.
+Surface fetch_surface(uvec4 hit, vec3 origin, vec3 direction) {
     int entry = int(hit.x) * 7;
     vec4 row0 = texelFetch(instances, entry), row1 = texelFetch(instances, entry + 1);
     vec4 row2 = texelFetch(instances, entry + 2), mesh = texelFetch(instances, entry + 6);
@@ -57,11 +79,12 @@ Surface fetch_surface(uvec4 hit, vec3 direction) {
     int shade = int(triangle.w) * 3;
     vec4 color_metallic = texelFetch(materials, shade), emission_roughness = texelFetch(materials, shade + 1);
     vec4 texture_flags = texelFetch(materials, shade + 2);
-    float u = uintBitsToFloat(hit.z), v = uintBitsToFloat(hit.w), w = 1.0 - u - v;
 
     vec3 p0 = to_world(row0, row1, row2, pu0.xyz);
     vec3 p1 = to_world(row0, row1, row2, pu1.xyz);
     vec3 p2 = to_world(row0, row1, row2, pu2.xyz);
+    vec2 uv = crossing(p0, p1, p2, origin, direction, uintBitsToFloat(hit.zw));
+    precise float u = uv.x, v = uv.y, w = 1.0 - u - v;
     precise vec3 position = p0 * w + p1 * u + p2 * v;
 
     Surface surface;
@@ -85,8 +108,8 @@ Surface fetch_surface(uvec4 hit, vec3 direction) {
     bool emits = front || texture_flags.y != 0.0;
     surface.emission = emits ? emission_roughness.rgb : vec3(0.0);
     if (texture_flags.x >= 0.0) {
-        vec2 uv = vec2(pu0.w, nv0.w) * w + vec2(pu1.w, nv1.w) * u + vec2(pu2.w, nv2.w) * v;
-        surface.base_color *= textureLod(textures, vec3(uv, texture_flags.x), 0.0).rgb;
+        vec2 texel = vec2(pu0.w, nv0.w) * w + vec2(pu1.w, nv1.w) * u + vec2(pu2.w, nv2.w) * v;
+        surface.base_color *= textureLod(textures, vec3(texel, texture_flags.x), 0.0).rgb;
     }
     return surface;
 }

@@ -6,14 +6,12 @@
 namespace rtc::lab {
 namespace {
 
-struct Q3 {
-    mpq_class x, y, z;
-};
+using Q3 = ExactPoint;
 
 // A bare mpq from float: mpq_set_d is exact.
 mpq_class q(float f) { return mpq_class(double(f)); }
 
-Q3 difference(const Vec3& a, const Vec3& b) { return {q(a.x) - q(b.x), q(a.y) - q(b.y), q(a.z) - q(b.z)}; }
+Q3 difference(const Q3& a, const Vec3& b) { return {a.x - q(b.x), a.y - q(b.y), a.z - q(b.z)}; }
 
 Q3 cross(const Q3& a, const Q3& b) {
     return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
@@ -56,6 +54,12 @@ bool filtered_out(const ExactRay& ray, const Triangle& v) {
 }  // namespace
 
 Verdict intersect(const ExactRay& ray, const Triangle& v, mpq_class* t) {
+    std::array<ExactPoint, 3> corners;
+    for (int i = 0; i < 3; ++i) corners[i] = {q(v[i].x), q(v[i].y), q(v[i].z)};
+    return intersect(ray, corners, t);
+}
+
+Verdict intersect(const ExactRay& ray, const std::array<ExactPoint, 3>& v, mpq_class* t) {
     const Q3 d = {q(ray.direction.x), q(ray.direction.y), q(ray.direction.z)};
     const Q3 a = difference(v[0], ray.origin), b = difference(v[1], ray.origin),
              c = difference(v[2], ray.origin);

@@ -3,6 +3,7 @@
 
 #include <gmpxx.h>
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -21,6 +22,14 @@ enum class Verdict { Miss, Hit, Boundary };  // Boundary: on an edge or vertex
 // Rational test of one triangle (closed; facing and interval not considered).
 // `t` is exact. Degenerate and parallel triangles are missed.
 Verdict intersect(const ExactRay& ray, const Triangle& triangle, mpq_class* t);
+
+// A point with rational coordinates.
+struct ExactPoint {
+    mpq_class x, y, z;
+};
+
+// The same test for corners that are no floats: of an instance's triangle in the world, say.
+Verdict intersect(const ExactRay& ray, const std::array<ExactPoint, 3>& triangle, mpq_class* t);
 
 struct ExactHit {
     uint32_t triangle = 0;

@@ -9,6 +9,7 @@
 #include "../lights.glsl"
 #include "../brdf.glsl"
 #include "../reflections.glsl"
+#include "../trace_log.glsl"
 
 layout(set = 0, binding = 0) uniform accelerationStructureEXT scene;
 layout(location = 0) rayPayloadInEXT Radiance incoming;
@@ -19,7 +20,8 @@ hitAttributeEXT vec2 barycentrics;
 void main() {
     vec3 direction = gl_WorldRayDirectionEXT;
     uvec4 hit = uvec4(gl_InstanceCustomIndexEXT, gl_PrimitiveID, floatBitsToUint(barycentrics));
-    Surface surface = fetch_surface(hit, direction);
+    LOG_RAY(gl_LaunchIDEXT.xy, gl_LaunchSizeEXT.x, 2u * incoming.depth, kLogClosest, gl_WorldRayOriginEXT, direction, kRayMax, hit);
+    Surface surface = fetch_surface(hit, gl_WorldRayOriginEXT, direction);
     vec3 ambient = 0.15 * mix(frame.sky_low.rgb, frame.sky_high.rgb, 0.5 + 0.5 * surface.ns.y);
     vec3 color = surface.emission + surface.base_color * ambient * (1.0 - surface.metallic);
 
@@ -28,8 +30,11 @@ void main() {
     vec3 value = evaluate_brdf(surface, -direction, light.direction, pdf) * light.radiance;
     if (max(value.r, max(value.g, value.b)) > 0.0) {
         visibility = 0.0;
+        vec3 start = spawn_point(surface, light.direction);
+        float end = light.distance * 0.9999;
         traceRayEXT(scene, gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsSkipClosestHitShaderEXT, 0xff, 0, 0, 1,
-                spawn_point(surface, light.direction), 0.0, light.direction, light.distance * 0.9999, 1);
+                start, 0.0, light.direction, end, 1);
+        LOG_RAY(gl_LaunchIDEXT.xy, gl_LaunchSizeEXT.x, 2u * incoming.depth + 1u, kLogShadow, start, light.direction, end, uvec4(visibility != 0.0));
         incoming.rays += 1.0;
         color += value * visibility;
     }

@@ -4,7 +4,11 @@
 #extension GL_GOOGLE_include_directive : require
 #include "../frame.glsl"
 #include "../reflections.glsl"
+#include "../trace_log.glsl"
 
 layout(location = 0) rayPayloadInEXT Radiance incoming;
 
-void main() { incoming.color = sky(gl_WorldRayDirectionEXT); }
+void main() {
+    LOG_RAY(gl_LaunchIDEXT.xy, gl_LaunchSizeEXT.x, 2u * incoming.depth, kLogClosest, gl_WorldRayOriginEXT, gl_WorldRayDirectionEXT, kRayMax, uvec4(kNoHit));
+    incoming.color = sky(gl_WorldRayDirectionEXT);
+}
