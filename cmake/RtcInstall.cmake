@@ -49,7 +49,7 @@ endforeach()
 
 if(RTC_INSTALLED)
   configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/rtc-config.cmake.in ${PROJECT_BINARY_DIR}/rtc-config.cmake
-    INSTALL_DESTINATION ${RTC_PACKAGE_DIR} NO_SET_AND_CHECK_MACRO)
+    INSTALL_DESTINATION ${RTC_PACKAGE_DIR} PATH_VARS CMAKE_INSTALL_BINDIR NO_SET_AND_CHECK_MACRO)
   # Before 1.0 a minor version may change what a caller sees.
   write_basic_package_version_file(${PROJECT_BINARY_DIR}/rtc-config-version.cmake COMPATIBILITY SameMinorVersion)
   install(FILES ${PROJECT_BINARY_DIR}/rtc-config.cmake ${PROJECT_BINARY_DIR}/rtc-config-version.cmake

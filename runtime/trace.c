@@ -64,6 +64,20 @@ VkDeviceSize rtrGetLaunchScratchSize(RtrDevice device, RtrPipeline p, uint32_t w
     return rtr_min_size(full, reach);
 }
 
+uint32_t rtrGetLaunchTileCount(RtrDevice device, RtrPipeline p, uint32_t w, uint32_t h, uint32_t d,
+                               VkDeviceSize scratch, uint64_t max_tile_lanes) {
+    const uint64_t group = p->options.workgroupSize, each = 4ull * p->header.scratch_words;
+    uint64_t lanes = 0, most, tiles;
+    bool tile;
+    if ((uint64_t)w * h <= 0xffffffffu) lanes = rtr_align(launch_lanes(w, h, d, &tile), group);
+    if (!lanes || lanes > 0xffffffffu) return 0;
+    most = max_tile_lanes && max_tile_lanes < lanes ? max_tile_lanes : lanes;
+    if (each) most = rtr_min_size(most, rtr_min_size(scratch, device->limits.maxStorageBufferRange) / each);
+    if (most < group) most = group;
+    tiles = (lanes + most / group * group - 1) / (most / group * group);
+    return (uint32_t)tiles;
+}
+
 static uint32_t param_stride(RtrDevice d) {
     return (uint32_t)rtr_align(PARAM_BYTES, d->limits.minUniformBufferOffsetAlignment);
 }

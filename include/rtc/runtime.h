@@ -533,6 +533,13 @@ RTR_API VkResult rtrCmdSetLaunchLimits(RtrRecorder recorder, uint64_t maxTileLan
 RTR_API VkDeviceSize rtrGetLaunchScratchSize(RtrDevice device, RtrPipeline pipeline, uint32_t width,
                                              uint32_t height, uint32_t depth, VkDeviceSize* pMinimum);
 
+/* Tiles such a launch is cut into with this much launch scratch and this limit of lanes a
+ * tile (rtrCmdSetLaunchLimits; 0: none), for rtrGetRecorderControlSize. 1 when nothing
+ * limits it, 0 when the launch is empty or too large to be recorded. */
+RTR_API uint32_t rtrGetLaunchTileCount(RtrDevice device, RtrPipeline pipeline, uint32_t width,
+                                       uint32_t height, uint32_t depth, VkDeviceSize scratchSize,
+                                       uint64_t maxTileLanes);
+
 /* Counterpart: vkCmdTraceRaysNV, same arguments. Buffers need STORAGE usage; offsets are
  * multiples of 64, strides of 32 and at most 4096; a NULL buffer is an empty region. Of
  * each buffer at most maxStorageBufferRange bytes from the offset can be reached

@@ -81,7 +81,8 @@ void RtcLauncher::make_recorder(const RtcScene& scene) {
     if (full) {
         const VkDeviceSize size = std::max(minimum, std::min(full, kScratchLimit));
         scratch_ = Buffer(device_.context, size, RTR_LAUNCH_SCRATCH_BUFFER_USAGE, MemoryKind::Device);
-        tiles = uint32_t((full + size - 1) / size) + 1;
+        tiles = std::max(1u, rtrGetLaunchTileCount(device_.handle, pipeline_, extent_.width, extent_.height,
+                                                   extent_.depth, size, 0));
     }
     const bool resumable = info().moduleFlags & RTC_MODULE_RESUMABLE;
     const VkDeviceSize control_size =

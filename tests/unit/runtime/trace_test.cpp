@@ -265,6 +265,7 @@ class ResumeTest : public TraceTest {
         int launches = 1;
         bool in_set = false;
         uint32_t max[3] = {0, 0, 0};  // indirect when set
+        uint32_t tiles = 1;           // of a launch of w x h x d
     };
 
     void run(const Run& c) {
@@ -299,6 +300,10 @@ class ResumeTest : public TraceTest {
         VkSpecializationMapEntry entry{7, 0, 4};
         VkSpecializationInfo specialization{1, &entry, 4, &app_constant};
         ASSERT_EQ(make_pipeline(code, 8, &options, &specialization), VK_SUCCESS);
+
+        EXPECT_EQ(rtrGetLaunchTileCount(rtr, pipeline, c.w, c.h, c.d, c.scratch, c.tile), c.tiles);
+        EXPECT_EQ(rtrGetLaunchTileCount(rtr, pipeline, c.w, 0, c.d, c.scratch, c.tile), 0u);
+        EXPECT_EQ(rtrGetLaunchTileCount(rtr, pipeline, 65536, 65536, 1, c.scratch, c.tile), 0u);
 
         // Hit record 1 carries data; the table lies at an odd place of its buffer.
         uint32_t data[4] = {11, 22, 33, 44};
@@ -387,11 +392,13 @@ TEST_F(ResumeTest, RoundsFinishEveryLaneOnce) { run({}); }
 TEST_F(ResumeTest, Tiles) {
     Run c;
     c.tile = 100;  // rounded down to three workgroups
+    c.tiles = 10;
     run(c);
 }
 TEST_F(ResumeTest, LittleScratchMakesTiles) {
     Run c;
     c.scratch = 256;
+    c.tiles = 15;
     run(c);
 }
 TEST_F(ResumeTest, RowsAndDepth) {
@@ -421,6 +428,7 @@ TEST_F(ResumeTest, IndirectRowsInTiles) {
     c.w = 70, c.h = 1, c.d = 5;
     c.max[0] = 100, c.max[1] = 2, c.max[2] = 5;
     c.tile = 160;
+    c.tiles = 3;
     run(c);
 }
 TEST_F(ResumeTest, IndirectBeyondItsMaximum) {
