@@ -139,9 +139,15 @@ static void tree(RtrBuild* b) {
                                 ? 1
                                 : ROTATION_PASSES;
     uint32_t pass;
+    b->push.step = 0;
     rtr_dispatch(b, RTR_KERNEL_lbvh_topology, groups);
     b->push.step = passes > 1;
     for (pass = 0; pass < passes; pass++) rtr_dispatch(b, RTR_KERNEL_lbvh_fit, groups);
+    if (passes > 1) { /* does nothing unless the tree has become too deep */
+        b->push.step = 2;
+        rtr_dispatch(b, RTR_KERNEL_lbvh_topology, groups);
+        rtr_dispatch(b, RTR_KERNEL_lbvh_fit, groups);
+    }
     b->push.blocks = rtr_groups(b->primitives, RTR_SCAN_BLOCK);
     rtr_dispatch(b, RTR_KERNEL_number_count, b->push.blocks);
     rtr_dispatch(b, RTR_KERNEL_number_scan, 1);

@@ -39,6 +39,7 @@
 #define RTR_COLLAPSED 0x80000000u
 #define RTR_HEIGHT_MASK 0xffu
 #define RTR_ENCODED_SHIFT 8u
+#define RTR_HEIGHT_FREE 44u /* rotations may make nodes this high, in inner nodes */
 
 /* State words. Floats that are reduced with atomics are order-preserving uints. */
 #define RTR_ST_CENTER_MIN 0u /* 3: bounds of (min + max) of the active boxes */
@@ -49,6 +50,7 @@
 #define RTR_ST_HAS 9u      /* RTC_FACT_HAS_* */
 #define RTR_ST_NODES 10u   /* encoded nodes */
 #define RTR_ST_ROOT 11u    /* inner node that is the root */
+#define RTR_ST_DEEP 12u    /* 1: deeper than RTC_MAX_DEPTH after rotating */
 #define RTR_ST_SUMS 64u  /* block sums and histograms start here */
 
 #define RTR_SORT_ITEMS 8u

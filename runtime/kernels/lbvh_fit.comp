@@ -4,13 +4,15 @@
 // are finished and goes on; the first one leaves. Nobody waits. Each pass adds two
 // arrivals to a node, so passes can follow each other without a reset.
 //
-// With p.step the pass also improves the tree by rotations (Kensler 2008): where it makes
+// With p.step 1 the pass also improves the tree by rotations (Kensler 2008): where it makes
 // the two children cheaper, a child changes places with a grandchild of the other side,
 // or two grandchildren with each other. The lane that finishes a node owns everything
-// below it. A rotation that would make the node higher is refused, so the bound that
-// Morton codes give for the depth stays. Measured on the CPU (three passes, against a
-// binned SAH tree): terrain 1.00, hair 1.02, soup 1.04, blob 1.09 of its SAH cost; the
-// Morton tree alone 1.02, 1.09, 1.08, 1.20; PLOC of radius 8 1.13, 1.02, 1.10, 1.09.
+// below it, so the result does not depend on who comes first. Large primitives beside
+// small ones need a deep tree (floor and bunny: 0.65 of the SAH cost that trees as low as
+// the Morton tree reach), so nodes may grow to RTR_HEIGHT_FREE; above that only rotations
+// that do not make a node higher are taken. Should the whole become deeper than
+// RTC_MAX_DEPTH all the same, the Morton tree comes back: p.step 2 (lbvh_topology.comp too).
+// docs/benchmarks.md compares the trees with others.
 #define RTR_COHERENT coherent
 #include "common.glsl"
 #include "tree.glsl"
@@ -18,7 +20,7 @@
 void rotate(uint node, inout uint l, inout uint r, inout Subtree a, inout Subtree b) {
     bool may = (p.flags & RTR_BUILD_TOP) == 0u;
     bool l_inner = (l & RTR_CHILD_LEAF) == 0u, r_inner = (r & RTR_CHILD_LEAF) == 0u;
-    uint limit = max(a.height, b.height);
+    uint limit = max(max(a.height, b.height), RTR_HEIGHT_FREE - 1u);
     // Only a gain that rounding cannot explain, else passes could swap to and fro.
     float least = (a.cost + b.cost) * 0.99999;
     uint choice = 0u;
@@ -123,9 +125,11 @@ void main() {
     uint i = lane_index();
     uint n = state[RTR_ST_ACTIVE];
     uint node = 0xffffffffu;
+    if (p.step == 2u && state[RTR_ST_DEEP] == 0u) return;
     if (i < n && n >= 2u) node = links[p.total + i];
-    // At most RTC_MAX_DEPTH turns; the bound also ends a lane if the links were damaged.
-    for (uint turn = 0u; turn < 64u && node != 0xffffffffu; turn++) {
+    // A Morton tree has at most 30 + 26 levels, and only nodes up to RTR_HEIGHT_FREE grow:
+    // fewer than 128 in all. The bound also ends a lane if the links were damaged.
+    for (uint turn = 0u; turn < 128u && node != 0xffffffffu; turn++) {
         device_fence();
         uint arrived = atomicAdd(marks[node], 1u);
         device_fence();
@@ -133,9 +137,11 @@ void main() {
         if ((arrived & 1u) != 0u) {
             uint l = info[node].x, r = info[node].y;
             Subtree a = load_subtree(l), b = load_subtree(r);
-            if (p.step != 0u) rotate(node, l, r, a, b);
-            store_subtree(node, l, r, join(a, b, node != 0u && (p.flags & RTR_BUILD_TOP) == 0u));
+            if (p.step == 1u) rotate(node, l, r, a, b);
+            Subtree whole = join(a, b, node != 0u && (p.flags & RTR_BUILD_TOP) == 0u);
+            store_subtree(node, l, r, whole);
             next = links[node];
+            if (next == 0xffffffffu && p.step == 1u) state[RTR_ST_DEEP] = whole.encoded > RTC_MAX_DEPTH ? 1u : 0u;
         }
         node = next;
     }

@@ -3,6 +3,7 @@
 // The binary radix tree over the sorted Morton codes (Karras 2012): every inner node
 // finds its range and its split alone. Equal codes are told apart by their position, so
 // a path has at most 30 + log2(count) nodes, below RTC_MAX_DEPTH for 2^28 primitives.
+// With p.step 2: only if the rotations made the tree too deep.
 #include "common.glsl"
 
 int prefix(int i, int j, int n) {
@@ -15,6 +16,7 @@ int prefix(int i, int j, int n) {
 void main() {
     int i = int(lane_index());
     int n = int(state[RTR_ST_ACTIVE]);
+    if (p.step == 2u && state[RTR_ST_DEEP] == 0u) return;
     if (i < n) slot_of[pairs_a[i].y] = uint(i);
     if (i == 0) state[RTR_ST_ROOT] = 0u;
     if (i >= n - 1) return;

@@ -161,6 +161,62 @@ TEST_P(BuildTest, GeometricChain) {
     expect_slots(facts, vertices);
 }
 
+// A Morton path of thirty levels that ends in concentric triangles, the cheapest tree of which is a chain:
+// rotations make it deeper than the limit, and the builder has to notice.
+TEST_P(BuildTest, ChainBelowAChainOfCodes) {
+    Scene scene(*vk, rtr, 8 << 20);
+    std::vector<Vec3> vertices;
+    auto add = [&](float x, float y, float z, float size) {
+        vertices.push_back({x - size, y - size, z - size});
+        vertices.push_back({x + size, y + size, z - size});
+        vertices.push_back({x, y, z + size});
+    };
+    const float far = 1e15f;
+    add(far, far, far, far * 1e-4f);  // the far corner of the codes
+    for (float at = far / 2; at >= far / 1024; at *= 0.5f) {
+        add(at, 0, 0, at * 1e-4f);
+        add(0, at, 0, at * 1e-4f);
+        add(0, 0, at, at * 1e-4f);
+    }
+    double size = 1e-18;
+    for (int i = 0; i < 253; i++, size *= 1.3) add(0, 0, 0, static_cast<float>(size));
+    auto as = scene.build_bottom({scene.triangles(vertices)}, flags());
+    TreeFacts facts;
+    check_structure(scene, as, facts);
+    expect_slots(facts, vertices);
+    if (getenv("RTC_PRINT")) printf("sah %.2f nodes %u depth %u\n", facts.sah, facts.nodes, facts.depth);
+}
+
+// A fine mesh on a floor of two triangles. A tree that keeps as low as a Morton tree cannot keep the floor
+// apart from the mesh and costs half as much again.
+TEST_P(BuildTest, FloorDoesNotDragTheMeshAlong) {
+    if (GetParam()) GTEST_SKIP() << "a builder of good trees is meant";
+    Scene scene(*vk, rtr, 16 << 20);
+    std::vector<Vec3> vertices;
+    for (float z : {-1.0f, 1.0f}) {
+        vertices.push_back({-6, 0, -6 * z});
+        vertices.push_back({6, 0, 6 * z});
+        vertices.push_back({-6 * z, 0, 6});
+    }
+    const int n = 60;
+    auto on_ball = [&](int i, int k) {
+        const float a = 3.14159265f * i / n, b = 6.2831853f * k / n;
+        return Vec3{0.5f * std::sin(a) * std::cos(b), 0.5f + 0.5f * std::cos(a), 0.5f * std::sin(a) * std::sin(b)};
+    };
+    for (int i = 0; i < n; i++) {
+        for (int k = 0; k < n; k++) {
+            for (auto [di, dk] : {std::pair(0, 0), {1, 0}, {0, 1}, {1, 0}, {1, 1}, {0, 1}})
+                vertices.push_back(on_ball(i + di, k + dk));
+        }
+    }
+    auto as = scene.build_bottom({scene.triangles(vertices)}, flags());
+    TreeFacts facts;
+    check_structure(scene, as, facts);
+    // 1.2 for the root and 2 for the floor are in any tree; the ball itself is 0.05 of the area.
+    EXPECT_LT(facts.sah, 4.2);
+    if (getenv("RTC_PRINT")) printf("sah %.2f nodes %u depth %u\n", facts.sah, facts.nodes, facts.depth);
+}
+
 TEST_P(BuildTest, ExtremeCoordinates) {
     Scene scene(*vk, rtr, 1 << 20);
     std::vector<Vec3> vertices;
