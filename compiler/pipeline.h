@@ -62,11 +62,18 @@ struct PipelineInput {
 enum class TargetEnv : uint32_t { Auto, Vulkan11, Vulkan12, Vulkan13 };
 enum class Optimization : uint32_t { None, Performance, Size };
 
+// How acceleration structure memory is reached (abi.h).
+enum class Addressing {
+    Heap,    // offsets into one bound heap; plain Vulkan 1.1
+    Address  // device addresses: needs bufferDeviceAddress
+};
+
 struct LinkOptions {
     TargetEnv target = TargetEnv::Auto;
     Optimization optimize = Optimization::None;
     bool debug_info = false;            // -g: keep OpLine, OpName, OpSource
     bool validate = true;               // run spirv-val on the result
+    Addressing addressing = Addressing::Heap;
     bool resumable = true;              // lanes can suspend (see docs/resumable.md)
     uint32_t max_recursion_depth = 0;   // trace calls nested in trace calls, 1..31; 0: 1, or 31 when hit or miss shaders trace
     uint32_t max_callable_depth = 0;    // 1..31; 0: 31

@@ -42,6 +42,16 @@ void rtr_dispatch(RtrBuild* b, RtrKernel kernel, uint64_t groups);
 typedef VkResult (*RtrInputFunction)(RtrBuild* b);
 VkResult rtr_for_each_input(RtrBuild* b, RtrInputFunction emit);
 
+/* One buffer of set 0 (RTR_IN_*) or 1 (RTR_ARR_*). */
+typedef struct RtrBinding {
+    uint32_t set, binding;
+    VkDescriptorBufferInfo info;
+} RtrBinding;
+/* Binds both sets with these buffers and, unless it is NULL, the heap's texels. */
+VkResult rtr_bind_sets(RtrRecorder recorder, RtrHeap heap, const RtrBinding* bindings, uint32_t count);
+void rtr_dispatch_kernel(RtrRecorder recorder, RtrKernel kernel, const struct RtrBuildPush* push,
+                         uint32_t groups);
+
 VkResult rtr_record_update(RtrBuild* b, RtrAccelerationStructure src);
 
 #endif /* RTR_BUILD_H_ */

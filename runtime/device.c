@@ -72,6 +72,7 @@ static VkResult create_kernels(RtrDevice d, VkPipelineCache cache, const VkAlloc
 
 VkResult rtrCreateDevice(const RtrDeviceCreateInfo* info, const VkAllocationCallbacks* allocator,
                          RtrDevice* pDevice) {
+    VkPhysicalDeviceIDProperties id = {.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ID_PROPERTIES};
     VkPhysicalDeviceProperties2 properties = {.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2};
     const char* missing = NULL;
     RtrDevice d;
@@ -131,8 +132,10 @@ VkResult rtrCreateDevice(const RtrDeviceCreateInfo* info, const VkAllocationCall
             goto fail;
         }
     }
+    properties.pNext = &id;
     d->vki.GetPhysicalDeviceProperties2(d->physical_device, &properties);
     d->limits = properties.properties.limits;
+    rtr_make_blob_version(&id, d->blob_version);
     r = create_layouts(d, allocator);
     if (r == VK_SUCCESS) r = create_kernels(d, info->pipelineCache, allocator);
     if (r != VK_SUCCESS) goto fail;

@@ -90,6 +90,8 @@ RtrGetBufferDeviceAddress rtr_load_buffer_device_address(const RtrInstanceTable*
     X(header)           \
     X(copy)             \
     X(property)         \
+    X(serialize)        \
+    X(deserialize)      \
     X(refit_links)      \
     X(refit_triangles)  \
     X(refit_aabbs)      \
@@ -101,7 +103,9 @@ RtrGetBufferDeviceAddress rtr_load_buffer_device_address(const RtrInstanceTable*
 /* Variants that follow device addresses; created only with bufferDeviceAddress. */
 #define RTR_ADDRESS_KERNELS(X) \
     X(leaf_instances_address)  \
-    X(copy_address)
+    X(copy_address)            \
+    X(serialize_address)       \
+    X(deserialize_address)
 
 typedef enum RtrKernel {
 #define X(name) RTR_KERNEL_##name,
@@ -131,6 +135,7 @@ struct RtrDevice_T {
     PFN_vkDebugUtilsMessengerCallbackEXT message_callback;
     void* message_user_data;
     VkPhysicalDeviceLimits limits;
+    uint8_t blob_version[2 * VK_UUID_SIZE]; /* driver UUID, then ours, see serialize.c */
     RtrPhysicalDeviceSupport support;
 
     VkDescriptorSetLayout input_layout; /* set 0 of the kernels */
@@ -320,5 +325,9 @@ static inline VkDescriptorBufferInfo rtr_header_info(const struct RtrAcceleratio
     info.range = RTC_AS_HEADER_QUADS * RTC_QUAD_BYTES;
     return info;
 }
+
+
+/* The version that serialised structures of this device and runtime carry. */
+void rtr_make_blob_version(const VkPhysicalDeviceIDProperties* id, uint8_t version[2 * VK_UUID_SIZE]);
 
 #endif /* RTR_INTERNAL_H_ */

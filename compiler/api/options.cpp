@@ -175,6 +175,16 @@ rtcc_status rtcc_options_set_validate(rtcc_options_t options, int enable) {
     });
 }
 
+rtcc_status rtcc_options_set_addressing(rtcc_options_t options, rtcc_addressing addressing) {
+    return set(options, [&](rtcc_options& o) {
+        if (addressing != RTCC_ADDRESSING_HEAP && addressing != RTCC_ADDRESSING_ADDRESS)
+            return RTCC_STATUS_INVALID_ARGUMENT;
+        o.link.addressing =
+            addressing == RTCC_ADDRESSING_ADDRESS ? rtc::Addressing::Address : rtc::Addressing::Heap;
+        return RTCC_STATUS_SUCCESS;
+    });
+}
+
 rtcc_status rtcc_options_set_resumable(rtcc_options_t options, int enable) {
     return set(options, [&](rtcc_options& o) {
         o.link.resumable = enable != 0;

@@ -47,6 +47,10 @@ class Machine {
     Program& p;
     const LinkOptions& options;
 
+    // The value of an acceleration structure: a heap offset, or a device address as two words.
+    bool addresses() const { return options.addressing == Addressing::Address; }
+    Id base_type() const { return addresses() ? p.vector_type(p.uint_type(), 2) : p.uint_type(); }
+
     // ---- traversal exports, by the names of compiler/traversal ----
     std::vector<Function> traversal_functions;
     void import_traversal(const ir::Module& traversal, bool any_hit, bool aabbs, bool resumable);

@@ -112,7 +112,7 @@ class Linker {
     }
 
     void import_traversal() {
-        const TraversalModule* traversal = find_traversal_module("watertight");
+        const TraversalModule* traversal = find_traversal_module("watertight", machine_.addresses());
         const ir::Module module =
             ir::read_module(std::vector<uint32_t>(traversal->words, traversal->words + traversal->count), "traversal");
         // Reports always hand over to the machine: it ends the shader after an accepted first hit.
@@ -120,6 +120,7 @@ class Linker {
         kinds_.loops_suspend = machine_.resumable = options_.resumable;
         machine_.import_traversal(module, has(StageKind::AnyHit), has(StageKind::Intersection), machine_.resumable);
         program_.module.version = module.version;
+        if (machine_.addresses()) program_.module.addressing = module.addressing;
     }
 
     void add_stage(uint32_t index, std::map<uint32_t, uint32_t>& spec_ids) {
@@ -247,7 +248,8 @@ class Linker {
         for (const Inst& inst : program_.module.globals) alive.insert(inst.result);
         std::erase_if(program_.module.entry_points[0].interface, [&](Id id) { return !alive.count(id); });
 
-        r.flags = machine_.resumable ? RTC_MODULE_RESUMABLE : 0;
+        r.flags = (machine_.resumable ? RTC_MODULE_RESUMABLE : 0) |
+                  (machine_.addresses() ? RTC_MODULE_ADDRESS_MODE : 0);
         r.state_count = static_cast<uint32_t>(machine_.states.size());
         r.max_recursion_depth = machine_.max_depth;
         r.max_callable_depth = machine_.callables ? machine_.max_callable_depth : 0;

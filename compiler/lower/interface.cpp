@@ -142,7 +142,7 @@ class Interface {
         const Inst* inst = p_.def(type);
         Id out = type;
         if (inst && inst->op == Op::OpTypeAccelerationStructureKHR) {
-            out = p_.uint_type();
+            out = m_.base_type();
         } else if (inst && inst->op == Op::OpTypePointer) {
             const StorageClass storage = p_.storage(type);
             const Id pointee = p_.pointee(type);
@@ -199,16 +199,24 @@ class Interface {
             function.def.type = map_type(function.def.type);
             function.def.ops[1] = map_type(function.def.ops[1]);
             for (Inst& param : function.params) param.type = map_type(param.type);
-            std::map<Id, Id> pointer_types;  // of ids defined in this function
-            for (Inst& param : function.params) pointer_types[param.result] = param.type;
+            std::map<Id, Id> pointer_types, value_types;  // of ids defined in this function
+            for (Inst& param : function.params) pointer_types[param.result] = value_types[param.result] = param.type;
             for (Block& block : function.blocks) {
                 std::vector<Inst> out;
                 for (Inst& inst : block.insts) {
-                    if (inst.op == Op::OpConvertUToAccelerationStructureKHR)
-                        stage_.fail("as-from-address", inst.source,
-                                    "an acceleration structure from a device address needs address mode, which this "
-                                    "compiler does not produce yet",
-                                    p_);
+                    if (inst.result && inst.type) value_types[inst.result] = inst.type;
+                    if (inst.op == Op::OpConvertUToAccelerationStructureKHR) {
+                        if (!m_.addresses())
+                            stage_.fail("as-from-address", inst.source,
+                                        "an acceleration structure from a device address needs address mode: compile "
+                                        "with --addressing=address (rtcc_options_set_addressing)",
+                                        p_);
+                        // A handle is the device address, as uint64_t or uvec2; a base is a uvec2.
+                        inst.op = Op::OpBitcast;
+                        const Inst* value = p_.def(inst.ops[0]);
+                        const Id given = value ? value->type : value_types[inst.ops[0]];
+                        if (given == m_.base_type()) inst.op = Op::OpCopyObject;
+                    }
                     const bool as_load = inst.op == Op::OpLoad &&
                                          p_.type_op(inst.type) == Op::OpTypeAccelerationStructureKHR;
                     if (inst.op == Op::OpTypeRayQueryKHR) continue;
@@ -225,12 +233,19 @@ class Interface {
                         const Inst* base = p_.def(inst.ops[0]);
                         const Id type = base ? base->type : pointer_types[inst.ops[0]];
                         if (type && p_.storage(type) == StorageClass::StorageBuffer) {
-                            Inst chain(Op::OpAccessChain, p_.pointer_type(StorageClass::StorageBuffer, p_.uint_type()),
-                                       p_.module.new_id(),
-                                       {inst.ops[0], p_.constant_u32(0), p_.constant_u32(RTC_HDR_SELF_LO)});
-                            chain.source = inst.source;
-                            inst.ops = {chain.result};
-                            out.push_back(std::move(chain));
+                            ir::Emitter e(p_, out, inst.source);
+                            auto self = [&](uint32_t word) {
+                                return e.chain(StorageClass::StorageBuffer, p_.uint_type(), inst.ops[0],
+                                               {p_.constant_u32(0), p_.constant_u32(word)});
+                            };
+                            if (m_.addresses()) {
+                                const Id low = e.load(p_.uint_type(), self(RTC_HDR_SELF_LO));
+                                const Id high = e.load(p_.uint_type(), self(RTC_HDR_SELF_HI));
+                                inst.op = Op::OpCompositeConstruct;
+                                inst.ops = {low, high};
+                            } else {
+                                inst.ops = {self(RTC_HDR_SELF_LO)};
+                            }
                         }
                     }
                     if (inst.result && p_.is_pointer(inst.type)) pointer_types[inst.result] = inst.type;

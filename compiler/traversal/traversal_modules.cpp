@@ -9,17 +9,25 @@ constexpr uint32_t kWatertight[] = {
 constexpr uint32_t kFast[] = {
 #include "traversal_fast.inc"
 };
+constexpr uint32_t kWatertightAddress[] = {
+#include "traversal_watertight_address.inc"
+};
+constexpr uint32_t kFastAddress[] = {
+#include "traversal_fast_address.inc"
+};
 
 constexpr TraversalModule kModules[] = {
-    {"watertight", kWatertight, std::size(kWatertight)},
-    {"fast", kFast, std::size(kFast)},
+    {"watertight", false, kWatertight, std::size(kWatertight)},
+    {"watertight", true, kWatertightAddress, std::size(kWatertightAddress)},
+    {"fast", false, kFast, std::size(kFast)},
+    {"fast", true, kFastAddress, std::size(kFastAddress)},
 };
 
 }  // namespace
 
-const TraversalModule* find_traversal_module(std::string_view tier) {
+const TraversalModule* find_traversal_module(std::string_view tier, bool addresses) {
     for (const TraversalModule& module : kModules) {
-        if (tier == module.name) return &module;
+        if (tier == module.name && addresses == module.addresses) return &module;
     }
     return nullptr;
 }

@@ -11,12 +11,14 @@ namespace rtc {
 
 struct TraversalModule {
     const char* name;  // tier
+    bool addresses;
     const uint32_t* words;
     size_t count;
 };
 
-// "watertight" (the default tier) or "fast"; null for a tier that does not exist.
-const TraversalModule* find_traversal_module(std::string_view tier);
+// "watertight" (the default tier) or "fast"; null for a tier that does not exist. `addresses`: the variant
+// that reads acceleration structures by device address (its RtcBase is a uvec2, not a uint).
+const TraversalModule* find_traversal_module(std::string_view tier, bool addresses = false);
 
 // Link constants: SpecIds of bool constants that the linker freezes.
 inline constexpr uint32_t RTC_LINK_BASE = 0x52540100u;

@@ -53,6 +53,7 @@
 #define RTC_HDR_BUILD_FLAGS 20u /* VkBuildAccelerationStructureFlagsNV */
 #define RTC_HDR_PRIMITIVE_COUNT 21u /* as given to the build, inactive ones included */
 #define RTC_HDR_FIRST_OFFENDER 22u /* first instance/primitive that breaks a fact; ~0 if none */
+#define RTC_HDR_SINGLE_INSTANCE 23u /* top level with one active instance: its index + 1; otherwise 0 */
 
 #define RTC_AS_MAGIC (0x52540000u | RTC_ABI_VERSION)
 #define RTC_AS_KIND_TOP 0u

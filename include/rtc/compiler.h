@@ -105,6 +105,12 @@ typedef enum rtcc_target_env {
     RTCC_TARGET_MAX_ENUM = 0x7fffffff
 } rtcc_target_env;
 
+typedef enum rtcc_addressing {
+    RTCC_ADDRESSING_HEAP = 0,
+    RTCC_ADDRESSING_ADDRESS = 1,
+    RTCC_ADDRESSING_MAX_ENUM = 0x7fffffff
+} rtcc_addressing;
+
 typedef enum rtcc_optimization {
     RTCC_OPTIMIZATION_NONE = 0,
     RTCC_OPTIMIZATION_PERFORMANCE = 1,
@@ -195,6 +201,10 @@ RTCC_EXPORT rtcc_status rtcc_options_set_max_callable_depth(rtcc_options_t optio
 RTCC_EXPORT rtcc_status rtcc_options_set_reserved(rtcc_options_t options, int32_t set, uint32_t binding);
 /* Run the SPIR-V validator on the result. Default 1. */
 RTCC_EXPORT rtcc_status rtcc_options_set_validate(rtcc_options_t options, int enable);
+/* How acceleration structures are reached: through one bound heap (the default, plain Vulkan 1.1), or by
+ * device address, which needs bufferDeviceAddress and lifts the heap's size limits. The runtime's
+ * acceleration structures must be bound the same way. */
+RTCC_EXPORT rtcc_status rtcc_options_set_addressing(rtcc_options_t options, rtcc_addressing addressing);
 /* Lanes can suspend and be resumed by a later dispatch. Default 1. */
 RTCC_EXPORT rtcc_status rtcc_options_set_resumable(rtcc_options_t options, int enable);
 RTCC_EXPORT rtcc_status rtcc_options_set_warnings_as_errors(rtcc_options_t options, int enable);

@@ -365,14 +365,60 @@ RTR_API VkResult rtrCmdCopyAccelerationStructure(RtrRecorder recorder, RtrAccele
                                                  VkCopyAccelerationStructureModeNV mode);
 
 /* Writes one uint64_t per structure at dstOffset (a multiple of 8) of a buffer with
- * STORAGE usage: the compacted size in bytes. queryType must be
- * VK_QUERY_TYPE_ACCELERATION_STRUCTURE_COMPACTED_SIZE_NV. Written in COMPUTE_SHADER.
- * Counterpart: vkCmdWriteAccelerationStructuresPropertiesNV, with a buffer in place
- * of the query pool. */
+ * STORAGE usage. queryType is VK_QUERY_TYPE_ACCELERATION_STRUCTURE_COMPACTED_SIZE_NV (or
+ * _KHR: bytes after compaction), _SIZE_KHR (bytes of the object), _SERIALIZATION_SIZE_KHR
+ * (bytes of its blob) or _SERIALIZATION_BOTTOM_LEVEL_POINTERS_KHR (handles in its blob).
+ * Written in COMPUTE_SHADER; the structures are read there and must have been built.
+ * Counterpart: vkCmdWriteAccelerationStructuresPropertiesNV and -KHR, with a buffer in
+ * place of the query pool. */
 RTR_API VkResult rtrCmdWriteAccelerationStructuresProperties(
     RtrRecorder recorder, uint32_t accelerationStructureCount,
     const RtrAccelerationStructure* pAccelerationStructures, VkQueryType queryType, VkBuffer dstBuffer,
     VkDeviceSize dstOffset);
+
+/* ---- Serialisation ------------------------------------------------------------------
+ * A structure as bytes that can be kept and given back to the same device, driver and
+ * version of rtc. The blob has KHR's layout: driver UUID and compatibility UUID (16 bytes
+ * each), uint64_t serializedSize, deserializedSize, handleCount; at byte 56 the handles of
+ * the bottom levels (one an instance, in order; 0 for inactive ones), which the application
+ * replaces by those of the bottom levels in their new places; then data of ours. Structures
+ * of both addressing modes can be read into either. */
+
+#define RTR_SERIALIZED_HANDLES_OFFSET 56u /* bytes */
+
+/* Writes `src` into a blob at dstOffset (a multiple of 256) of a STORAGE buffer. dstSize:
+ * bytes there are for it, at least what the query SERIALIZATION_SIZE_KHR answered; when the
+ * blob does not fit, its UUIDs are 0 and nothing reads it. Stage COMPUTE_SHADER.
+ * Counterpart: vkCmdCopyAccelerationStructureToMemoryKHR. */
+RTR_API VkResult rtrCmdCopyAccelerationStructureToMemory(RtrRecorder recorder, RtrAccelerationStructure src,
+                                                         VkBuffer dstBuffer, VkDeviceSize dstOffset,
+                                                         VkDeviceSize dstSize);
+/* Makes `dst` of a blob of srcSize bytes at srcOffset (a multiple of 256) of a STORAGE
+ * buffer. dst was created with compactedSize = the blob's deserializedSize (or larger) and
+ * the type of what was serialised. Bottom levels named by the blob's handles must be there
+ * before; an instance whose handle leads nowhere is never hit. A blob that the device cannot
+ * take (another version, another type, damaged sizes) leaves a null structure: every ray
+ * misses it. So ask rtrGetSerializedAccelerationStructureInfo first. Stage COMPUTE_SHADER.
+ * Counterpart: vkCmdCopyMemoryToAccelerationStructureKHR. */
+RTR_API VkResult rtrCmdCopyMemoryToAccelerationStructure(RtrRecorder recorder, RtrAccelerationStructure dst,
+                                                         VkBuffer srcBuffer, VkDeviceSize srcOffset,
+                                                         VkDeviceSize srcSize);
+
+typedef struct RtrSerializedInfo {
+    VkDeviceSize serializedSize;   /* bytes of the blob */
+    VkDeviceSize deserializedSize; /* compactedSize of the structure to make of it */
+    uint64_t handleCount;
+} RtrSerializedInfo;
+
+/* Reads a blob in host memory (dataSize bytes, or at least its first 56).
+ * Errors: INCOMPATIBLE_DRIVER naming what differs (driver, device or rtc version);
+ * VALIDATION_FAILED when it is no blob, or shorter than it says (dataSize > 56 only). */
+RTR_API VkResult rtrGetSerializedAccelerationStructureInfo(RtrDevice device, const void* pData,
+                                                           size_t dataSize, RtrSerializedInfo* pInfo);
+/* Counterpart: vkGetDeviceAccelerationStructureCompatibilityKHR. pVersionData: the first 32
+ * bytes of a blob. */
+RTR_API void rtrGetDeviceAccelerationStructureCompatibility(
+    RtrDevice device, const uint8_t* pVersionData, VkAccelerationStructureCompatibilityKHR* pCompatibility);
 
 /* ---- Pipelines ---------------------------------------------------------------------- */
 

@@ -110,4 +110,22 @@ struct RtrBuildPush {
     RTR_UINT pad;
 };
 
+/* What the property kernel answers (p.count). */
+#define RTR_PROPERTY_COMPACTED_SIZE 0u
+#define RTR_PROPERTY_SIZE 1u /* in p.first, p.total */
+#define RTR_PROPERTY_SERIALIZED_SIZE 2u
+#define RTR_PROPERTY_HANDLES 3u
+
+/* ---- Serialised structures: word indices in a blob, the layout of KHR -----------------
+ * version (driver UUID, compatibility UUID: 8 words), bytes of the blob, bytes of the
+ * structure, number of handles (64 bits each), the handles; at the next multiple of 256
+ * bytes the structure, compacted, its base and those of its instances' bottom levels
+ * taken out (1 where an instance was active). */
+#define RTR_BLOB_SIZE 8u
+#define RTR_BLOB_STRUCTURE_SIZE 10u
+#define RTR_BLOB_HANDLE_COUNT 12u
+#define RTR_BLOB_HANDLES 14u
+/* Quads from the start of the blob to the structure. */
+#define RTR_BLOB_DATA_QUAD(handles) ((RTR_BLOB_HANDLES * 4u + 8u * (handles) + 255u) / 256u * 16u)
+
 #endif /* RTR_BUILD_SHARED_H_ */

@@ -50,5 +50,6 @@ void main() {
     else if (w == RTC_HDR_BUILD_FLAGS) v = p.build_flags;
     else if (w == RTC_HDR_PRIMITIVE_COUNT) v = p.total;
     else if (w == RTC_HDR_FIRST_OFFENDER) v = state[RTR_ST_OFFENDER];
+    else if (w == RTC_HDR_SINGLE_INSTANCE) v = top && n == 1u ? pairs_a[0].y + 1u : 0u;
     dst_header[w] = v;
 }

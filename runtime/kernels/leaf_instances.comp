@@ -7,6 +7,7 @@
 // Instances: the record traversal reads, the facts, and a conservative world box.
 #include "common.glsl"
 #include "leaf.glsl"
+#include "block.glsl"
 
 // ---- two-float arithmetic (Dekker 1971, Knuth): hi + lo, |lo| <= ulp(hi) / 2 ----
 // `precise` keeps drivers from rearranging it; fma() is not used because GLSL does not
@@ -99,18 +100,6 @@ void invert(vec4 m[3], out vec4 w[3]) {
         row.w = row.w * t_scale;
         w[r] = row;
     }
-}
-
-// Whether the reference leads to a structure that was built. A device address can only be
-// followed on trust.
-bool is_structure(uint base_lo, uint base_hi) {
-#ifdef RTR_ADDRESS
-    uvec4 h1 = block_quad(base_lo, base_hi, RTC_HDR_FACTS / 4u);
-    if ((h1.x & RTC_FACT_ADDRESSES) == 0u) return false;
-#else
-    if (base_hi != 0u || base_lo > p.heap_quads - RTC_AS_HEADER_QUADS) return false;
-#endif
-    return block_quad(base_lo, base_hi, RTC_HDR_MAGIC / 4u).z == RTC_AS_MAGIC;
 }
 
 void main() {

@@ -186,7 +186,7 @@ class Parser {
 
     static bool takes_value(std::string_view name) {
         for (std::string_view known :
-             {"--hit-group", "--stage", "--pipeline", "--reflect", "--target-env", "--max-recursion-depth",
+             {"--addressing", "--hit-group", "--stage", "--pipeline", "--reflect", "--target-env", "--max-recursion-depth",
               "--max-callable-depth", "--reserved", "--dump-after"})
             if (name == known) return true;
         return false;
@@ -222,6 +222,11 @@ class Parser {
             else
                 throw UsageError("invalid value '" + value + "' in '--target-env=" + value +
                                  "': expected vulkan1.1, vulkan1.2 or vulkan1.3");
+        } else if (name == "--addressing") {
+            if (value != "heap" && value != "address")
+                throw UsageError("invalid value '" + value + "' in '--addressing=" + value +
+                                 "': expected heap or address");
+            out_.addressing = value == "address" ? RTCC_ADDRESSING_ADDRESS : RTCC_ADDRESSING_HEAP;
         } else if (name == "--max-recursion-depth") {
             out_.recursion_depth = number_between(name, value, 1, 31);
         } else if (name == "--max-callable-depth") {

@@ -14,6 +14,9 @@ An input file of - is the standard input. Files are GLSL (GL_NV_ray_tracing or
 GL_EXT_ray_tracing) or SPIR-V, told apart by SPIR-V's magic number.
 
 Options:
+  --addressing=<mode>
+                    How acceleration structures are reached: heap (default;
+                    plain Vulkan 1.1) or address (needs bufferDeviceAddress).
   -c                Only compile: each GLSL file to its own SPIR-V stage
                     (FILE.spv), nothing is linked.
   -Dmacro[=defn]    Add an implicit macro definition.

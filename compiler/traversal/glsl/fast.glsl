@@ -3,7 +3,7 @@
 // measures how many.
 const float RTC_SLAB_GROWTH = 1.0;
 
-void rtc_level_numbers(uint base, vec3 o, vec3 d, bool top) {
+void rtc_level_numbers(RtcBase base, vec3 o, vec3 d, bool top) {
     // A finite reciprocal keeps 0 * inf out of the slabs.
     vec3 tiny = vec3(1e-30);
     vec3 sign_bits = uintBitsToFloat((floatBitsToUint(d) & uvec3(0x80000000u)) | floatBitsToUint(tiny));

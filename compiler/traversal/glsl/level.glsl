@@ -47,25 +47,25 @@ void rtc_level_setup() {
     rtc_trav_setup = 0u;
     bool top = rtc_trav_instance == RTC_NONE;
     bool enter = true;
-    uint base = rtc_ray_root;
+    RtcBase base = rtc_ray_root;
     uint bits = 0u;
     uint record_index = 0u;
     vec3 o = rtc_ray_origin;
     vec3 d = rtc_ray_direction * rtc_trav_t_down;
     if (!top) {
-        uint record = rtc_trav_records + rtc_trav_instance * RTC_INSTANCE_QUADS;
-        uvec4 ids = rtc_quad(record + 6u);
-        uint facts = rtc_quad(record + 7u).x;
-        base = ids.x;
+        RtcBase record = rtc_advance(rtc_trav_records, rtc_trav_instance * RTC_INSTANCE_QUADS);
+        uvec4 ids = rtc_quad(record, 6u);
+        uint facts = rtc_quad(record, 7u).x;
+        base = rtc_base(ids.x, ids.y);
         bits = rtc_level_bits(facts, ids.w >> 24u);
         record_index = (ids.w & 0x00ffffffu) + (rtc_ray_sbt_offset & 15u);
         bool aabbs = (bits & RTC_LEVEL_AABBS) != 0u;
         uint skip = aabbs ? RTC_RAY_SKIP_AABBS : RTC_RAY_SKIP_TRIANGLES;
-        enter = base != 0u && ((ids.z >> 24u) & rtc_ray_mask) != 0u && (rtc_ray_flags & skip) == 0u &&
+        enter = !rtc_is_null(base) && ((ids.z >> 24u) & rtc_ray_mask) != 0u && (rtc_ray_flags & skip) == 0u &&
                 (aabbs ? RTC_LINK_AABBS : RTC_LINK_TRIANGLES);
-        vec4 r0 = uintBitsToFloat(rtc_quad(record));
-        vec4 r1 = uintBitsToFloat(rtc_quad(record + 1u));
-        vec4 r2 = uintBitsToFloat(rtc_quad(record + 2u));
+        vec4 r0 = uintBitsToFloat(rtc_quad(record, 0u));
+        vec4 r1 = uintBitsToFloat(rtc_quad(record, 1u));
+        vec4 r2 = uintBitsToFloat(rtc_quad(record, 2u));
         o = rtc_transform_point(r0, r1, r2, o);
         d = rtc_transform_vector(r0, r1, r2, d);
         // A singular or overflowing transform leaves no ray to follow.
@@ -73,9 +73,9 @@ void rtc_level_setup() {
         enter = enter && largest > 0.0 && rtc_finite(largest);
     }
     if (enter) {
-        uvec4 header = rtc_quad(base + RTC_HDR_NODES / 4u); // nodes, slots, node count, slot count
-        rtc_trav_nodes = base + header.x;
-        rtc_trav_slots = base + header.y;
+        uvec4 header = rtc_quad(base, RTC_HDR_NODES / 4u); // nodes, slots, node count, slot count
+        rtc_trav_nodes = rtc_advance(base, header.x);
+        rtc_trav_slots = rtc_advance(base, header.y);
         rtc_trav_record = record_index;
         rtc_trav_bits = bits;
         rtc_trav_origin = o;

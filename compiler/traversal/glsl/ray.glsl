@@ -1,6 +1,6 @@
 // The ray, what it has hit so far and what it may hit next. Trace sites set
 // rtc_ray_*; everything else belongs to traversal.
-uint rtc_ray_root;
+RtcBase rtc_ray_root;
 uint rtc_ray_flags;
 uint rtc_ray_mask;
 uint rtc_ray_sbt_offset;
@@ -39,9 +39,9 @@ uint rtc_trav_sp; // entries on the stack
 uint rtc_trav_floor; // entries that belong to the top level while inside an instance
 uint rtc_trav_instance; // instance entered, RTC_NONE in the top level
 uint rtc_trav_setup; // 1: the level's data below must be computed before the next step
-uint rtc_trav_records; // heap quad of instance record 0
-uint rtc_trav_nodes; // heap quad of this level's node 0
-uint rtc_trav_slots; // heap quad of this level's slot 0
+RtcBase rtc_trav_records; // instance record 0
+RtcBase rtc_trav_nodes; // this level's node 0
+RtcBase rtc_trav_slots; // this level's slot 0
 uint rtc_trav_record; // hit record index of geometry 0 in this instance
 uint rtc_trav_bits; // RTC_LEVEL_*
 float rtc_trav_tmin; // in units of the scaled direction

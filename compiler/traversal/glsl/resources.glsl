@@ -2,10 +2,12 @@
 layout(set = 0, binding = RTC_BINDING_PARAMS, std140) uniform RtcParams {
     uvec4 q[RTC_PARAM_QUADS];
 } rtc_params;
+#ifndef RTC_ADDRESS_MODE
 layout(set = 0, binding = RTC_BINDING_HEAP_TEXELS) uniform utextureBuffer rtc_heap_texels;
 layout(set = 0, binding = RTC_BINDING_HEAP, std430) readonly buffer RtcHeap {
     uvec4 q[];
 } rtc_heap;
+#endif
 layout(set = 0, binding = RTC_BINDING_SBT_RAYGEN, std430) readonly buffer RtcSbtRaygen {
     uint w[];
 } rtc_sbt_raygen;
@@ -21,15 +23,47 @@ layout(set = 0, binding = RTC_BINDING_SBT_CALLABLE, std430) readonly buffer RtcS
 layout(set = 0, binding = RTC_BINDING_CONTROL, std430) buffer RtcControl { uint w[]; } rtc_control;
 layout(set = 0, binding = RTC_BINDING_SCRATCH, std430) buffer RtcScratch { uint w[]; } rtc_scratch;
 
-uvec4 rtc_quad(uint index) {
+// Where acceleration structure memory is (abi.h): a base, and quads from it.
+// Heap mode: quads from the start of the heap, which is bound. Address mode
+// (RTC_ADDRESS_MODE): a device address; nothing is bound.
+#ifdef RTC_ADDRESS_MODE
+#define RtcBase uvec2
+struct RtcQuads3 {
+    uvec4 q0, q1, q2;
+};
+struct RtcQuads4 {
+    uvec4 q0, q1, q2, q3;
+};
+layout(buffer_reference, buffer_reference_align = 16, std430) readonly buffer RtcQuadsAt { uvec4 q[]; };
+layout(buffer_reference, buffer_reference_align = 16, std430) readonly buffer RtcTrianglesAt { RtcQuads3 q[]; };
+layout(buffer_reference, buffer_reference_align = 16, std430) readonly buffer RtcNodesAt { RtcQuads4 q[]; };
+
+uvec4 rtc_quad(RtcBase base, uint index) { return RtcQuadsAt(base).q[index]; }
+
+RtcBase rtc_base(uint low, uint high) { return uvec2(low, high); }
+bool rtc_is_null(RtcBase base) { return (base.x | base.y) == 0u; }
+// No structure is larger than 4 GiB: its sizes are counted in quads of 32 bits, its memory in a buffer range.
+RtcBase rtc_advance(RtcBase base, uint quads) {
+    uint carry;
+    uint low = uaddCarry(base.x, quads << 4u, carry);
+    return uvec2(low, base.y + (quads >> 28u) + carry);
+}
+#else
+#define RtcBase uint
+uvec4 rtc_quad(RtcBase base, uint index) {
     uvec4 quad;
     if (RTC_FETCH == RTC_FETCH_TEXEL) {
-        quad = texelFetch(rtc_heap_texels, int(index));
+        quad = texelFetch(rtc_heap_texels, int(base + index));
     } else {
-        quad = rtc_heap.q[index];
+        quad = rtc_heap.q[base + index];
     }
     return quad;
 }
+
+RtcBase rtc_base(uint low, uint high) { return low; }
+bool rtc_is_null(RtcBase base) { return base == 0u; }
+RtcBase rtc_advance(RtcBase base, uint quads) { return base + quads; }
+#endif
 
 // `word` is one of RTC_PARAM_*: a constant at every call, so this folds to one
 // uniform load.

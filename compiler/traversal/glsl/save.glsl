@@ -8,7 +8,12 @@ void rtc_trace_save(uint first_word) {
     rtc_scratch_store(w + 1u, rtc_trav_sp);
     rtc_scratch_store(w + 2u, rtc_trav_floor);
     rtc_scratch_store(w + 3u, rtc_trav_instance);
+#ifdef RTC_ADDRESS_MODE
+    rtc_scratch_store(w + 4u, rtc_ray_root.x);
+    rtc_scratch_store(w + 30u, rtc_ray_root.y);
+#else
     rtc_scratch_store(w + 4u, rtc_ray_root);
+#endif
     rtc_scratch_store(w + 5u, rtc_ray_flags);
     rtc_scratch_store(w + 6u, rtc_ray_mask);
     uint operands = (rtc_ray_sbt_offset & 15u) | (rtc_ray_sbt_stride & 15u) << 4u | rtc_ray_miss << 8u;
@@ -50,7 +55,11 @@ void rtc_trace_restore(uint first_word) {
     rtc_trav_sp = rtc_scratch_load(w + 1u);
     rtc_trav_floor = rtc_scratch_load(w + 2u);
     rtc_trav_instance = rtc_scratch_load(w + 3u);
+#ifdef RTC_ADDRESS_MODE
+    rtc_ray_root = uvec2(rtc_scratch_load(w + 4u), rtc_scratch_load(w + 30u));
+#else
     rtc_ray_root = rtc_scratch_load(w + 4u);
+#endif
     rtc_ray_flags = rtc_scratch_load(w + 5u);
     rtc_ray_mask = rtc_scratch_load(w + 6u);
     uint operands = rtc_scratch_load(w + 7u);

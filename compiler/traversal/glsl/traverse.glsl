@@ -14,7 +14,7 @@ uint rtc_count(uint reference) { return (reference >> RTC_REF_COUNT_SHIFT) & RTC
 
 // A lane suspends only while its stack fits what rtc_trace_save keeps.
 bool rtc_budget_spent() {
-    return RTC_LINK_RESUMABLE && rtc_turns >= RTC_STEP_BUDGET && rtc_trav_sp <= RTC_TRAVERSAL_STACK;
+    return RTC_LINK_RESUMABLE && RTC_STEP_BUDGET != 0xffffffffu && rtc_turns >= RTC_STEP_BUDGET && rtc_trav_sp <= RTC_TRAVERSAL_STACK;
 }
 
 void rtc_trace_begin() {
@@ -46,13 +46,18 @@ void rtc_trace_begin() {
     // An infinite tmax is legal; as bits it is below every NaN.
     bool ordered =
         (floatBitsToUint(rtc_ray_tmax) & 0x7fffffffu) <= 0x7f800000u && rtc_ray_tmin <= rtc_ray_tmax;
-    if (rtc_ray_root != 0u && finite && ordered && rtc_largest(d) > 0.0) {
-        uvec4 header = rtc_quad(rtc_ray_root); // self low, self high, magic, kind
+    if (!rtc_is_null(rtc_ray_root) && finite && ordered && rtc_largest(d) > 0.0) {
+        uvec4 header = rtc_quad(rtc_ray_root, 0u); // self low, self high, magic, kind
         if (header.z != RTC_AS_MAGIC || header.w != RTC_AS_KIND_TOP) {
             rtc_error(RTC_LAUNCH_ERROR_ABI, header.z, header.w);
         } else {
-            rtc_trav_cur = 0u;
             rtc_trav_setup = 1u;
+            rtc_trav_cur = 0u;
+            // A top level of one instance has nothing to search: the walk starts inside.
+            uint single = rtc_quad(rtc_ray_root, RTC_HDR_SINGLE_INSTANCE / 4u)[RTC_HDR_SINGLE_INSTANCE & 3u];
+            if (single != 0u) {
+                rtc_trav_instance = single - 1u;
+            }
         }
     }
 }
@@ -62,7 +67,7 @@ void rtc_ray_setup() {
     rtc_choose_scale();
     rtc_trav_tmin = max(rtc_ray_tmin, 0.0) * rtc_trav_t_up;
     rtc_trav_tmax = rtc_hit_t * rtc_trav_t_up;
-    rtc_trav_records = rtc_ray_root + rtc_quad(rtc_ray_root + RTC_HDR_SLOTS / 4u)[RTC_HDR_SLOTS & 3u];
+    rtc_trav_records = rtc_advance(rtc_ray_root, rtc_quad(rtc_ray_root, RTC_HDR_SLOTS / 4u)[RTC_HDR_SLOTS & 3u]);
 }
 
 void rtc_trace_stop() { rtc_trav_cur = RTC_REF_DONE; }
@@ -128,10 +133,16 @@ void rtc_candidate(uint primitive, uint geometry_flags, uint opacity) {
 }
 
 uint rtc_test_triangle(uint slot) {
+#ifdef RTC_ADDRESS_MODE
+    uvec4 q0 = RtcTrianglesAt(rtc_trav_slots).q[slot].q0;
+    uvec4 q1 = RtcTrianglesAt(rtc_trav_slots).q[slot].q1;
+    uvec4 q2 = RtcTrianglesAt(rtc_trav_slots).q[slot].q2;
+#else
     uint at = rtc_trav_slots + slot * RTC_TRIANGLE_QUADS;
-    uvec4 q0 = rtc_quad(at);
-    uvec4 q1 = rtc_quad(at + 1u);
-    uvec4 q2 = rtc_quad(at + 2u);
+    uvec4 q0 = rtc_quad(at, 0u);
+    uvec4 q1 = rtc_quad(at, 1u);
+    uvec4 q2 = rtc_quad(at, 2u);
+#endif
     float t, b1, b2;
     bool front;
     uint result = RTC_STEP_RUNNING;
@@ -168,9 +179,8 @@ uint rtc_test_triangle(uint slot) {
 }
 
 uint rtc_test_aabb(uint slot) {
-    uint at = rtc_trav_slots + slot * RTC_AABB_QUADS;
-    uvec4 q0 = rtc_quad(at);
-    uvec4 q1 = rtc_quad(at + 1u);
+    uvec4 q0 = rtc_quad(rtc_trav_slots, slot * RTC_AABB_QUADS);
+    uvec4 q1 = rtc_quad(rtc_trav_slots, slot * RTC_AABB_QUADS + 1u);
     uint opacity = rtc_opacity(q1.w);
     float near;
     uint result = RTC_STEP_RUNNING;
@@ -184,11 +194,18 @@ uint rtc_test_aabb(uint slot) {
 // Both children of the node under the cursor; the nearer becomes the cursor.
 // (mix with a boolean is a select.)
 uint rtc_test_node() {
+#ifdef RTC_ADDRESS_MODE
+    uvec4 q0 = RtcNodesAt(rtc_trav_nodes).q[rtc_trav_cur].q0;
+    uvec4 q1 = RtcNodesAt(rtc_trav_nodes).q[rtc_trav_cur].q1;
+    uvec4 q2 = RtcNodesAt(rtc_trav_nodes).q[rtc_trav_cur].q2;
+    uvec4 q3 = RtcNodesAt(rtc_trav_nodes).q[rtc_trav_cur].q3;
+#else
     uint at = rtc_trav_nodes + rtc_trav_cur * RTC_NODE_QUADS;
-    uvec4 q0 = rtc_quad(at);
-    uvec4 q1 = rtc_quad(at + 1u);
-    uvec4 q2 = rtc_quad(at + 2u);
-    uvec4 q3 = rtc_quad(at + 3u);
+    uvec4 q0 = rtc_quad(at, 0u);
+    uvec4 q1 = rtc_quad(at, 1u);
+    uvec4 q2 = rtc_quad(at, 2u);
+    uvec4 q3 = rtc_quad(at, 3u);
+#endif
     float near0, near1;
     bool hit0 = rtc_slab(uintBitsToFloat(q0.xyz), uintBitsToFloat(q1.xyz), near0);
     bool hit1 = rtc_slab(uintBitsToFloat(q2.xyz), uintBitsToFloat(q3.xyz), near1);
@@ -243,7 +260,8 @@ uint rtc_trace_step() {
                 } else if (rtc_count(rtc_trav_cur) == 0u) {
                     // Out of nodes. An instance goes back to the top level, whose data is made
                     // anew.
-                    bool top = rtc_trav_instance == RTC_NONE;
+                    // Nothing waits there when it was the last entry: the ray is finished.
+                    bool top = rtc_trav_instance == RTC_NONE || rtc_trav_floor == 0u;
                     rtc_trav_cur = top ? RTC_REF_DONE : RTC_REF_POP;
                     rtc_trav_instance = RTC_NONE;
                     rtc_trav_floor = 0u;

@@ -55,9 +55,9 @@ const float RTC_PAD_TOP_D = 3.81469727e-6; // 64u
 const float RTC_TINY = 3.5527136788e-15; // 2^-48
 const float RTC_PAD_FLUSH = 7.52316385e-37; // 2^-120
 
-void rtc_level_numbers(uint base, vec3 o, vec3 d, bool top) {
-    vec3 bounds_min = uintBitsToFloat(rtc_quad(base + RTC_HDR_BOUNDS_MIN / 4u).xyz);
-    vec3 bounds_max = uintBitsToFloat(rtc_quad(base + RTC_HDR_BOUNDS_MAX / 4u).xyz);
+void rtc_level_numbers(RtcBase base, vec3 o, vec3 d, bool top) {
+    vec3 bounds_min = uintBitsToFloat(rtc_quad(base, RTC_HDR_BOUNDS_MIN / 4u).xyz);
+    vec3 bounds_max = uintBitsToFloat(rtc_quad(base, RTC_HDR_BOUNDS_MAX / 4u).xyz);
     vec3 a = abs(d);
     rtc_trav_axis = a.x > a.y ? (a.x > a.z ? 0u : 2u) : (a.y > a.z ? 1u : 2u);
     vec3 k = rtc_axes(d);

@@ -112,6 +112,23 @@ TEST_F(Target, ReservedMistakes) {
     }
 }
 
+TEST_F(Target, Addressing) {
+    const auto heap = reflection(""), address = reflection("--addressing=address", "ext");
+    EXPECT_THAT(heap["flags"].dump(), Not(HasSubstr("addressMode")));
+    EXPECT_THAT(address["flags"].dump(), HasSubstr("addressMode"));
+    EXPECT_THAT(address["requiredFeatures"].dump(), HasSubstr("bufferDeviceAddress"));
+    EXPECT_THAT(address["reserved"]["bindings"].dump(), Not(HasSubstr("heap")));
+    // Memory is only reached by address: no capability of the heap's texel buffer is left.
+    const std::string text = disassembled(module("--addressing=address"));
+    EXPECT_THAT(text, HasSubstr("OpMemoryModel PhysicalStorageBuffer64"));
+    EXPECT_THAT(text, Not(HasSubstr("OpCapability SampledBuffer")));
+    for (const char* target : {"vulkan1.1", "vulkan1.2", "vulkan1.3"})
+        EXPECT_TRUE(is_valid_for(module(std::string("--addressing=address --target-env=") + target, "ext"), target));
+    const CliRun run = rtc("camera.rgen --addressing=pointer");
+    EXPECT_EQ(run.status, 2);
+    EXPECT_THAT(run.err, HasSubstr("expected heap or address"));
+}
+
 TEST_F(Target, NoResumable) {
     EXPECT_THAT(reflection("")["flags"].dump(), HasSubstr("resumable"));
     EXPECT_THAT(reflection("--no-resumable")["flags"].dump(), Not(HasSubstr("resumable")));
