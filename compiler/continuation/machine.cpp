@@ -3,7 +3,6 @@
 #include "continuation/machine.h"
 
 #include "rtc/abi.h"
-#include "traversal/traversal_modules.h"
 
 namespace rtc::continuation {
 
@@ -40,150 +39,6 @@ Id Machine::word(std::vector<Id>& words, uint32_t i, const char* name) {
     return words[i];
 }
 
-namespace {
-
-void freeze_link_constants(ir::Module& module, const std::map<uint32_t, bool>& values) {
-    std::map<Id, bool> frozen;
-    std::erase_if(module.decorations, [&](const Inst& inst) {
-        if (inst.op != Op::OpDecorate || inst.ops[1] != static_cast<uint32_t>(spv::Decoration::SpecId)) return false;
-        const auto found = values.find(inst.ops[2]);
-        if (found == values.end()) return false;
-        frozen[inst.ops[0]] = found->second;
-        return true;
-    });
-    for (Inst& inst : module.globals)
-        if (const auto found = frozen.find(inst.result); found != frozen.end())
-            inst.op = found->second ? Op::OpConstantTrue : Op::OpConstantFalse;
-}
-
-bool is_float_operation(Op op) {
-    switch (op) {
-        case Op::OpFNegate:
-        case Op::OpFAdd:
-        case Op::OpFSub:
-        case Op::OpFMul:
-        case Op::OpFDiv:
-        case Op::OpFRem:
-        case Op::OpFMod:
-        case Op::OpVectorTimesScalar: return true;
-        default: return false;
-    }
-}
-
-// Operations a driver may evaluate in more than one way even when told not to contract.
-bool is_banned(const Inst& inst) {
-    switch (inst.op) {
-        case Op::OpDot:
-        case Op::OpMatrixTimesVector:
-        case Op::OpVectorTimesMatrix:
-        case Op::OpMatrixTimesMatrix:
-        case Op::OpMatrixTimesScalar:
-        case Op::OpOuterProduct: return true;
-        default: return false;
-    }
-}
-
-}  // namespace
-
-void Machine::import_traversal(const ir::Module& traversal, bool with_any_hit, bool with_aabbs, bool resumable) {
-    any_hit = with_any_hit;
-    aabbs = with_aabbs;
-    ir::Module source = traversal;
-    freeze_link_constants(source, {{RTC_LINK_ANY_HIT, with_any_hit},
-                                   {RTC_LINK_AABBS, with_aabbs},
-                                   {RTC_LINK_TRIANGLES, true},
-                                   {RTC_LINK_RESUMABLE, resumable}});
-    source.entry_points.clear();
-    std::unordered_map<Id, Id> map;
-    traversal_functions = p.import(source, map);
-
-    for (const Inst& inst : source.names) {
-        if (inst.op != Op::OpName) continue;
-        std::string name = ir::words_string(inst.ops.data() + 1, inst.ops.size() - 1);
-        name = name.substr(0, name.find('('));
-        const auto found = map.find(inst.ops[0]);
-        if (found != map.end() && name.rfind("rtc_", 0) == 0) exports_.emplace(name, found->second);
-    }
-    for (const Inst& inst : p.module.globals)
-        if (inst.op == Op::OpVariable) {
-            uint32_t binding = 0;
-            if (p.decoration(inst.result, spv::Decoration::Binding, &binding)) reserved[binding] = inst.result;
-        }
-    for (const auto& [binding, id] : reserved) {
-        p.remove_decorations(id, spv::Decoration::Binding);
-        p.remove_decorations(id, spv::Decoration::DescriptorSet);
-    }
-
-    for (Function& function : traversal_functions) {
-        export_types_[std::to_string(function.id())] = function.def.type;
-        for (Block& block : function.blocks)
-            for (Inst& inst : block.insts) {
-                if (is_banned(inst))
-                    ir::fail("internal-traversal", "", 0,
-                             std::string("traversal uses ") + ir::op_info(inst.op)->name +
-                                 ", whose rounding is the driver's choice");
-                // Numbers that hold in the source must hold in the binary.
-                if (is_float_operation(inst.op) && !p.decoration(inst.result, spv::Decoration::NoContraction))
-                    p.decorate(inst.result, spv::Decoration::NoContraction);
-            }
-    }
-
-    // glslang passes `in` parameters through pointers to copies. The functions states call take values
-    // instead, so that they can be called from anywhere without temporaries. (Others may have `out`
-    // parameters and stay as they are.)
-    static const char* const kCalled[] = {
-        "rtc_report_begin",      "rtc_object_to_world",      "rtc_world_to_object",   "rtc_instance_custom_index",
-        "rtc_object_ray_origin", "rtc_object_ray_direction", "rtc_sbt_raygen_word",   "rtc_sbt_miss_word",
-        "rtc_sbt_hit_word",      "rtc_sbt_callable_word",    "rtc_miss_record",       "rtc_hit_record_base",
-        "rtc_callable_record",   "rtc_error",                "rtc_scratch_load",      "rtc_scratch_store",
-        "rtc_trace_save",        "rtc_trace_restore"};
-    std::map<Id, std::vector<Id>> by_value;  // function -> parameter value types
-    for (const char* name : kCalled) {
-        const Id id = function(name);
-        for (Function& function : traversal_functions) {
-            if (function.id() != id || function.params.empty()) continue;
-            std::vector<Id> types;
-            std::vector<Inst> prologue, stores;
-            for (Inst& param : function.params) {
-                if (!p.is_pointer(param.type)) {
-                    types.push_back(param.type);
-                    continue;
-                }
-                const Id value_type = p.pointee(param.type);
-                types.push_back(value_type);
-                const Id value = p.module.new_id();
-                prologue.push_back(Inst(Op::OpVariable, param.type, param.result,
-                                        {static_cast<uint32_t>(spv::StorageClass::Function)}));
-                stores.push_back(Inst(Op::OpStore, 0, 0, {param.result, value}));
-                param.result = value;
-                param.type = value_type;
-            }
-            std::vector<Inst>& first = function.blocks.front().insts;
-            size_t at = 0;
-            while (at < first.size() && first[at].op == Op::OpVariable) ++at;
-            first.insert(first.begin() + at, stores.begin(), stores.end());
-            first.insert(first.begin(), prologue.begin(), prologue.end());
-            function.def.ops[1] = p.function_type(function.def.type, types);
-            by_value[id] = types;
-        }
-    }
-    for (Function& function : traversal_functions)
-        for (Block& block : function.blocks) {
-            std::vector<Inst> out;
-            for (Inst& inst : block.insts) {
-                if (inst.op == Op::OpFunctionCall)
-                    if (const auto found = by_value.find(inst.ops[0]); found != by_value.end())
-                        for (size_t i = 1; i < inst.ops.size(); ++i) {
-                            Inst load(Op::OpLoad, found->second[i - 1], p.module.new_id(), {inst.ops[i]});
-                            inst.ops[i] = load.result;
-                            out.push_back(std::move(load));
-                        }
-                out.push_back(std::move(inst));
-            }
-            block.insts = std::move(out);
-        }
-}
-
 Id Machine::function(const std::string& name) const { return variable(name); }
 
 Id Machine::variable(const std::string& name) const {
@@ -194,7 +49,7 @@ Id Machine::variable(const std::string& name) const {
 
 Id Machine::call(Emitter& e, const std::string& name, const std::vector<Id>& arguments) const {
     const Id id = function(name);
-    return e.call(id, export_types_.at(std::to_string(id)), arguments);
+    return e.call(id, export_types_.at(id), arguments);
 }
 
 Id Machine::load(Emitter& e, const std::string& name) const {

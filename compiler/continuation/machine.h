@@ -16,6 +16,10 @@
 #include "ir/emitter.h"
 #include "lower/stage.h"
 
+namespace rtc {
+struct TraversalModule;
+}
+
 namespace rtc::continuation {
 
 using ir::Block;
@@ -53,7 +57,7 @@ class Machine {
 
     // ---- traversal exports, by the names of compiler/traversal ----
     std::vector<Function> traversal_functions;
-    void import_traversal(const ir::Module& traversal, bool any_hit, bool aabbs, bool resumable);
+    void import_traversal(const TraversalModule& traversal, bool any_hit, bool aabbs, bool resumable);
     Id function(const std::string& name) const;
     Id variable(const std::string& name) const;
     Id call(Emitter& e, const std::string& name, const std::vector<Id>& arguments = {}) const;
@@ -147,7 +151,7 @@ class Machine {
     std::vector<Inst> variables_;
     std::vector<Id> payload_words_, callable_words_, frame_words_;
     std::map<std::string, Id> exports_;
-    std::map<std::string, Id> export_types_;  // function result type, or variable pointee
+    std::map<Id, Id> export_types_;  // result types of traversal functions
 };
 
 // split.cpp: cuts a stage in memory form into states at its calls and adds them to the machine.

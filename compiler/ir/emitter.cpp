@@ -3,14 +3,14 @@
 
 namespace rtc::ir {
 
-Id Emitter::value(Op op, Id type, std::vector<uint32_t> ops) {
+Id Emitter::value(Op op, Id type, Words ops) {
     Inst inst(op, type, p.module.new_id(), std::move(ops));
     inst.source = source_;
     out_.push_back(std::move(inst));
     return out_.back().result;
 }
 
-void Emitter::effect(Op op, std::vector<uint32_t> ops) {
+void Emitter::effect(Op op, Words ops) {
     Inst inst(op, 0, 0, std::move(ops));
     inst.source = source_;
     out_.push_back(std::move(inst));
@@ -23,7 +23,7 @@ Id Emitter::chain(spv::StorageClass storage, Id type, Id base, std::vector<Id> i
 
 Id Emitter::extract(Id type, Id composite, const std::vector<uint32_t>& path) {
     if (path.empty()) return composite;
-    std::vector<uint32_t> ops{composite};
+    Words ops{composite};
     ops.insert(ops.end(), path.begin(), path.end());
     return value(Op::OpCompositeExtract, type, std::move(ops));
 }
@@ -31,7 +31,7 @@ Id Emitter::extract(Id type, Id composite, const std::vector<uint32_t>& path) {
 Id Emitter::construct(Id type, const std::vector<Id>& parts) { return value(Op::OpCompositeConstruct, type, parts); }
 
 Id Emitter::call(Id function, Id result_type, const std::vector<Id>& arguments) {
-    std::vector<uint32_t> ops{function};
+    Words ops{function};
     ops.insert(ops.end(), arguments.begin(), arguments.end());
     return value(Op::OpFunctionCall, result_type, std::move(ops));
 }

@@ -13,8 +13,8 @@ class Emitter {
 
     Program& p;
 
-    Id value(Op op, Id type, std::vector<uint32_t> ops);
-    void effect(Op op, std::vector<uint32_t> ops);
+    Id value(Op op, Id type, Words ops);
+    void effect(Op op, Words ops);
 
     Id load(Id type, Id pointer) { return value(Op::OpLoad, type, {pointer}); }
     void store(Id pointer, Id object) { effect(Op::OpStore, {pointer, object}); }

@@ -32,109 +32,21 @@ const Row kRows[] = {
 #undef RTC_OP
 };
 
-constexpr uint32_t kMaskParameters_MemoryAccess_Id = 0x8 | 0x10 | 0x10000 | 0x20000;
-constexpr uint32_t kMemoryAligned = 0x2;
-constexpr uint32_t kImageGrad = 0x4;
-constexpr uint32_t kImageFlagsWithoutOperand = 0x400 | 0x800 | 0x1000 | 0x2000 | 0x4000;
-
-// Visits every id word of `words` under `pattern`; stops quietly at the end of the words.
-template <typename Words, typename Fn>
-void visit_ids(Op op, const char* pattern, Words& words, uint32_t switch_words, const Fn& fn) {
-    size_t i = 0;
-    const size_t n = words.size();
-    for (const char* p = pattern; *p && i < n; ++p) {
-        const char kind = *p;
-        const bool star = p[1] == '*';
-        if (p[1] == '*' || p[1] == '?') ++p;
-        do {
-            switch (kind) {
-                case 'r': fn(words[i++]); break;
-                case 'l':
-                case 'x':
-                case 'b': ++i; break;
-                case 'S': {
-                    const Op inner = static_cast<Op>(words[i++]);
-                    // The embedded instruction's own operands follow.
-                    const OpInfo* info = op_info(inner);
-                    const char* q = info ? info->pattern : "r*";
-                    for (; *q && i < n; ++q) {
-                        const char inner_kind = *q;
-                        const bool inner_star = q[1] == '*';
-                        if (q[1] == '*' || q[1] == '?') ++q;
-                        do {
-                            if (inner_kind == 'r') fn(words[i]);
-                            ++i;
-                        } while (inner_star && i < n);
-                    }
-                    break;
-                }
-                case 's': {
-                    while (i < n) {
-                        const uint32_t word = words[i++];
-                        if (!(word & 0xff000000u) || !(word & 0x00ff0000u) || !(word & 0x0000ff00u) || !(word & 0xffu))
-                            break;
-                    }
-                    break;
-                }
-                case 'c': i = n; break;
-                case 'p':
-                    i += switch_words;
-                    if (i < n) fn(words[i++]);
-                    break;
-                case 'q':
-                    fn(words[i++]);
-                    ++i;
-                    break;
-                case 'R':
-                    fn(words[i++]);
-                    if (i < n) fn(words[i++]);
-                    break;
-                case 'm': {
-                    const uint32_t mask = words[i++];
-                    for (uint32_t bit = 1; bit && i < n; bit <<= 1) {
-                        if (!(mask & bit)) continue;
-                        if (bit == kMemoryAligned)
-                            ++i;
-                        else if (bit & kMaskParameters_MemoryAccess_Id)
-                            fn(words[i++]);
-                    }
-                    break;
-                }
-                case 'i': {
-                    const uint32_t mask = words[i++];
-                    for (uint32_t bit = 1; bit && i < n; bit <<= 1) {
-                        if (!(mask & bit) || (bit & kImageFlagsWithoutOperand)) continue;
-                        fn(words[i++]);
-                        if (bit == kImageGrad && i < n) fn(words[i++]);
-                    }
-                    break;
-                }
-                case 'o': i = n; break;
-                case 'd':
-                    ++i;
-                    if (op == Op::OpDecorateId)
-                        while (i < n) fn(words[i++]);
-                    i = n;
-                    break;
-                case 'e':
-                    ++i;
-                    if (op == Op::OpExecutionModeId)
-                        while (i < n) fn(words[i++]);
-                    i = n;
-                    break;
-                default: ++i; break;
-            }
-        } while (star && i < n);
-    }
+// Opcode to row of the table plus one; 0 for none.
+std::vector<uint16_t> make_index() {
+    std::vector<uint16_t> index(8192, 0);
+    for (size_t i = 0; i < std::size(kRows); ++i)
+        if (kRows[i].value < index.size()) index[kRows[i].value] = static_cast<uint16_t>(i + 1);
+    return index;
 }
 
 }  // namespace
 
 const OpInfo* op_info(Op op) {
-    const uint16_t value = static_cast<uint16_t>(op);
-    const Row* end = kRows + std::size(kRows);
-    const Row* row = std::lower_bound(kRows, end, value, [](const Row& r, uint16_t v) { return r.value < v; });
-    return row != end && row->value == value ? &row->info : nullptr;
+    static const std::vector<uint16_t> index = make_index();
+    const auto value = static_cast<uint32_t>(op);
+    const uint16_t row = value < index.size() ? index[value] : uint16_t{0};
+    return row ? &kRows[row - 1].info : nullptr;
 }
 
 bool Inst::is_terminator() const {
@@ -151,14 +63,6 @@ bool Inst::is_terminator() const {
         case Op::OpTerminateRayKHR: return true;
         default: return false;
     }
-}
-
-void Inst::for_each_id(const std::function<void(Id&)>& fn) {
-    if (const OpInfo* info = op_info(op)) visit_ids(op, info->pattern, ops, switch_words, fn);
-}
-
-void Inst::for_each_id(const std::function<void(Id)>& fn) const {
-    if (const OpInfo* info = op_info(op)) visit_ids(op, info->pattern, ops, switch_words, fn);
 }
 
 const Inst* Block::merge() const {

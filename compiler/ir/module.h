@@ -11,6 +11,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "ir/words.h"
 #include "pipeline.h"
 
 #include <spirv/unified1/spirv.hpp11>
@@ -40,18 +41,20 @@ struct Inst {
     Op op = Op::OpNop;
     Id type = 0;
     Id result = 0;
-    std::vector<uint32_t> ops;  // everything after type and result
+    Words ops;  // everything after type and result
     SourceLine source;
     uint8_t switch_words = 1;  // literal words per OpSwitch case (2 for 64-bit selectors)
 
     Inst() = default;
-    Inst(Op o, Id t, Id r, std::vector<uint32_t> w) : op(o), type(t), result(r), ops(std::move(w)) {}
+    Inst(Op o, Id t, Id r, Words w) : op(o), type(t), result(r), ops(std::move(w)) {}
 
     bool is_terminator() const;
     bool is_merge() const { return op == Op::OpSelectionMerge || op == Op::OpLoopMerge; }
-    // Calls fn on every id operand (not on type and result).
-    void for_each_id(const std::function<void(Id&)>& fn);
-    void for_each_id(const std::function<void(Id)>& fn) const;
+    // Calls fn on every id operand (not on type and result): fn(Id&), or fn(Id) on a const Inst.
+    template <typename Fn>
+    void for_each_id(Fn&& fn);
+    template <typename Fn>
+    void for_each_id(Fn&& fn) const;
 };
 
 struct Block {
@@ -131,3 +134,5 @@ std::vector<uint32_t> write_module(const Module& module, bool with_debug_info);
 std::string to_text(const std::vector<uint32_t>& words);
 
 }  // namespace rtc::ir
+
+#include "ir/operands.h"

@@ -60,7 +60,7 @@ Id Program::intern(Inst inst, const std::string& extra_key) {
 
 Id Program::add_global(Inst inst) {
     if (!inst.result) inst.result = module.new_id();
-    global_index_[inst.result] = module.globals.size();
+    global_index_[inst.result] = static_cast<uint32_t>(module.globals.size() + 1);
     module.globals.push_back(std::move(inst));
     return module.globals.back().result;
 }
@@ -95,16 +95,6 @@ Id Program::constant_bool(bool value) {
 }
 Id Program::constant_null(Id type) { return intern(Inst(Op::OpConstantNull, type, 0, {})); }
 Id Program::undef(Id type) { return intern(Inst(Op::OpUndef, type, 0, {})); }
-
-const Inst* Program::def(Id id) const {
-    const auto found = global_index_.find(id);
-    return found == global_index_.end() ? nullptr : &module.globals[found->second];
-}
-
-Op Program::type_op(Id type) const {
-    const Inst* inst = def(type);
-    return inst ? inst->op : Op::OpNop;
-}
 
 Id Program::pointee(Id pointer_type) const { return def(pointer_type)->ops[1]; }
 
@@ -284,21 +274,25 @@ uint32_t Program::file_index(const std::string& name) {
 void Program::reindex() {
     global_index_.clear();
     for (size_t i = 0; i < module.globals.size(); ++i)
-        if (module.globals[i].result) global_index_[module.globals[i].result] = i;
+        if (module.globals[i].result) global_index_[module.globals[i].result] = static_cast<uint32_t>(i + 1);
     std::erase_if(module.decorations, [](const Inst& inst) { return inst.op == Op::OpNop; });
     decoration_index_.clear();
     for (size_t i = 0; i < module.decorations.size(); ++i)
         decoration_index_[module.decorations[i].ops[0]].push_back(i);
 }
 
-std::vector<Function> Program::import(const Module& source, std::unordered_map<Id, Id>& map) {
+std::vector<Function> Program::import(const Module& source, IdMap<Id>& map) {
     auto mapped = [&](Id id) {
-        auto [it, fresh] = map.emplace(id, 0);
-        if (fresh) it->second = module.new_id();
-        return it->second;
+        Id& known = map[id];
+        if (!known) known = module.new_id();
+        return known;
     };
     std::unordered_map<Id, std::vector<const Inst*>> decorations;
-    for (const Inst& inst : source.decorations) decorations[inst.ops[0]].push_back(&inst);
+    IdSet decorated;
+    for (const Inst& inst : source.decorations) {
+        decorated.insert(inst.ops[0]);
+        decorations[inst.ops[0]].push_back(&inst);
+    }
 
     for (spv::Capability capability : source.capabilities) module.add_capability(capability);
     for (const std::string& extension : source.extensions) module.add_extension(extension);
@@ -315,6 +309,7 @@ std::vector<Function> Program::import(const Module& source, std::unordered_map<I
     }
 
     auto add_decorations = [&](Id from, Id to) {
+        if (!decorated.contains(from)) return;
         const auto found = decorations.find(from);
         if (found == decorations.end()) return;
         for (const Inst* inst : found->second) {
@@ -377,8 +372,6 @@ std::vector<Function> Program::import(const Module& source, std::unordered_map<I
 
     std::vector<Function> functions;
     functions.reserve(source.functions.size());
-    std::set<Id> global_ids;
-    for (const Inst& inst : source.globals) global_ids.insert(inst.result);
     for (const Function& function : source.functions) {
         Function copy = function;
         auto map_inst = [&](Inst& inst) {
@@ -400,13 +393,12 @@ std::vector<Function> Program::import(const Module& source, std::unordered_map<I
         functions.push_back(std::move(copy));
     }
 
-    std::set<Id> named;
-    for (const Inst& inst : module.names) named.insert(inst.ops[0]);
+    for (; names_seen_ < module.names.size(); ++names_seen_) named_.insert(module.names[names_seen_].ops[0]);
     for (const Inst& inst : source.names) {
-        const auto found = map.find(inst.ops[0]);
-        if (found == map.end() || named.count(found->second)) continue;
+        const Id to = map.get(inst.ops[0]);
+        if (!to || named_.contains(to)) continue;
         Inst copy = inst;
-        copy.ops[0] = found->second;
+        copy.ops[0] = to;
         module.names.push_back(std::move(copy));
     }
     return functions;

@@ -8,6 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "ir/id_set.h"
 #include "ir/module.h"
 
 namespace rtc::ir {
@@ -40,8 +41,14 @@ class Program {
     Id undef(Id type);
 
     // ---- looking things up ----
-    const Inst* def(Id id) const;  // global instruction defining id, or nullptr
-    Op type_op(Id type) const;     // OpNop when unknown
+    const Inst* def(Id id) const {  // global instruction defining id, or nullptr
+        const uint32_t index = global_index_.get(id);
+        return index ? &module.globals[index - 1] : nullptr;
+    }
+    Op type_op(Id type) const {  // OpNop when unknown
+        const Inst* inst = def(type);
+        return inst ? inst->op : Op::OpNop;
+    }
     Id pointee(Id pointer_type) const;
     spv::StorageClass storage(Id pointer_type) const;
     // Value of an integer constant (not specialisable); false otherwise.
@@ -72,7 +79,7 @@ class Program {
     // ---- import ----
     // Adds `source`'s types, constants, globals, decorations and names, and returns its functions
     // with every id mapped. `map` receives source id -> program id.
-    std::vector<Function> import(const Module& source, std::unordered_map<Id, Id>& map);
+    std::vector<Function> import(const Module& source, IdMap<Id>& map);
 
     // Types of lowered acceleration structures: the header block, and arrays of it by original array type.
     Id header_struct = 0;
@@ -86,10 +93,12 @@ class Program {
     static std::string key_of(const Inst& inst, const std::string& extra);
 
     std::unordered_map<std::string, Id> interned_;
-    std::unordered_map<Id, size_t> global_index_;
+    IdMap<uint32_t> global_index_;  // index plus one
     std::unordered_map<Id, std::vector<size_t>> decoration_index_;
     std::map<std::string, uint32_t> file_index_;
     std::map<std::string, Id> ext_sets_;
+    IdSet named_;  // targets of the first names_seen_ names
+    size_t names_seen_ = 0;
 };
 
 }  // namespace rtc::ir

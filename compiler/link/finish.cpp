@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 
+#include "ir/id_set.h"
 #include "link/link.h"
 #include "rtc/abi.h"
 
@@ -60,20 +61,20 @@ void place_reserved(Program& p, continuation::Machine& machine, const LinkOption
 
 void tidy(Program& p, const std::vector<Id>& roots) {
     ir::Module& m = p.module;
-    std::set<Id> live;
+    ir::IdSet live;
     std::vector<Id> work(roots);
-    std::unordered_map<Id, size_t> functions;
-    for (size_t i = 0; i < m.functions.size(); ++i) functions[m.functions[i].id()] = i;
+    ir::IdMap<uint32_t> functions;  // index plus one
+    for (size_t i = 0; i < m.functions.size(); ++i) functions[m.functions[i].id()] = static_cast<uint32_t>(i + 1);
     auto need = [&](Id id) {
-        if (id && live.insert(id).second) work.push_back(id);
+        if (id && live.insert(id)) work.push_back(id);
     };
     for (Id id : roots) live.insert(id);
     for (const Inst& inst : m.execution_modes) inst.for_each_id([&](Id id) { need(id); });
     while (!work.empty()) {
         const Id id = work.back();
         work.pop_back();
-        if (const auto found = functions.find(id); found != functions.end()) {
-            const ir::Function& function = m.functions[found->second];
+        if (const uint32_t index = functions.get(id)) {
+            const ir::Function& function = m.functions[index - 1];
             auto visit = [&](const Inst& inst) {
                 need(inst.type);
                 if (inst.result) live.insert(inst.result);
@@ -118,10 +119,10 @@ void tidy(Program& p, const std::vector<Id>& roots) {
             forward.insert(inst.ops[0]);
             ordered.push_back(inst);
         }
-    std::set<Id> placed;
+    ir::IdSet placed;
     std::function<void(Id)> place = [&](Id id) {
         const Inst* inst = p.def(id);
-        if (!inst || !placed.insert(id).second) return;
+        if (!inst || !placed.insert(id)) return;
         if (inst->type) place(inst->type);
         inst->for_each_id([&](Id operand) {
             if (inst->op == Op::OpTypeStruct && forward.count(operand)) return;
@@ -135,13 +136,13 @@ void tidy(Program& p, const std::vector<Id>& roots) {
     m.globals = std::move(ordered);
 
     // Ids by first appearance: the same module whatever the passes allocated on the way.
-    std::unordered_map<Id, Id> numbers;
+    ir::IdMap<Id> numbers;
     Id next = 1;
     auto number = [&](Id& id) {
         if (!id) return;
-        auto [it, fresh] = numbers.emplace(id, next);
-        if (fresh) ++next;
-        id = it->second;
+        Id& known = numbers[id];
+        if (!known) known = next++;
+        id = known;
     };
     auto renumber = [&](Inst& inst) {
         number(inst.type);
@@ -221,7 +222,7 @@ void declare_entry(Program& p, Id main, const LinkOptions& options, Reflection& 
     entry.model = spv::ExecutionModel::GLCompute;
     entry.function = main;
     entry.name = "main";
-    std::set<Id> used;
+    ir::IdSet used;
     for (const ir::Function& function : m.functions)
         for (const ir::Block& block : function.blocks)
             for (const Inst& inst : block.insts) inst.for_each_id([&](Id id) { used.insert(id); });

@@ -113,14 +113,10 @@ class Linker {
 
     void import_traversal() {
         const TraversalModule* traversal = find_traversal_module("watertight", machine_.addresses());
-        const ir::Module module =
-            ir::read_module(std::vector<uint32_t>(traversal->words, traversal->words + traversal->count), "traversal");
         // Reports always hand over to the machine: it ends the shader after an accepted first hit.
         kinds_.report_suspends = true;
-        kinds_.loops_suspend = machine_.resumable = options_.resumable;
-        machine_.import_traversal(module, has(StageKind::AnyHit), has(StageKind::Intersection), machine_.resumable);
-        program_.module.version = module.version;
-        if (machine_.addresses()) program_.module.addressing = module.addressing;
+        kinds_.loops_suspend = options_.resumable;
+        machine_.import_traversal(*traversal, has(StageKind::AnyHit), has(StageKind::Intersection), options_.resumable);
     }
 
     void add_stage(uint32_t index, std::map<uint32_t, uint32_t>& spec_ids) {
@@ -148,7 +144,7 @@ class Linker {
         module.execution_modes.clear();
         link::specialize(module, stage_input, spec_ids, result_.reflection.spec_constants);
 
-        std::unordered_map<Id, Id> map;
+        ir::IdMap<Id> map;
         std::vector<ir::Function> functions = program_.import(module, map);
 
         lower::Stage stage;
@@ -158,8 +154,8 @@ class Linker {
         stage.file = stage_input.file;
         std::set<Id> variables;
         for (const Inst& inst : module.globals)
-            if (inst.op == Op::OpVariable) variables.insert(map.at(inst.result));
-        lower::select_entry(program_, stage, std::move(functions), map.at(entry_function), variables);
+            if (inst.op == Op::OpVariable) variables.insert(map.get(inst.result));
+        lower::select_entry(program_, stage, std::move(functions), map.get(entry_function), variables);
         // NV's exits and locations first: nothing later may see code after an ignore.
         lower::normalize_calls(program_, stage);
         check::check_stage(program_, stage, input_, result_.diagnostics);

@@ -2,6 +2,7 @@
 // the module-scope variables it owns.
 #include <set>
 
+#include "ir/id_set.h"
 #include "lower/stage.h"
 
 namespace rtc::lower {
@@ -54,7 +55,7 @@ void select_entry(Program& program, Stage& stage, std::vector<Function> function
         stage.fail("entry-point-missing", {}, "the entry point's function has no body", program);
     walk(by_id[entry]);
 
-    std::set<Id> used;
+    ir::IdSet used;
     for (size_t i = 0; i < functions.size(); ++i) {
         if (marks[i] != Black) continue;
         for (const Block& block : functions[i].blocks)
