@@ -312,7 +312,7 @@ TEST_F(LabTest, EveryConfigurationFindsTheSame) {
     std::mt19937_64 random(1);
     std::uniform_real_distribution<float> unit(-1, 1);
     for (uint32_t i = 0; i < 40; ++i) {
-        Instance instance{.blas = i % 3};
+        Instance instance{.blas = i % 3, .mask = i % 2 ? 0x0fu : 0xffu};
         for (auto& row : instance.object_to_world) {
             for (float& m : row) m += 0.4f * unit(random);
             row[3] = 6 * unit(random);
@@ -326,6 +326,7 @@ TEST_F(LabTest, EveryConfigurationFindsTheSame) {
                            {unit(random), unit(random), unit(random)});
         ray.sbt = i % 3 ? 0u : uint32_t(kIgnore);
         ray.report_t = 5;
+        ray.mask = i % 4 ? 0xffu : 0xf0u;  // some instances are chosen and not entered
         rays.push_back(ray);
     }
     DeviceTracer& reference = shared_tracer();

@@ -113,6 +113,11 @@ void main() {
                 rtc_trav_cur = 5u;
                 rtc_trav_nodes = 0u;
                 rtc_trav_tmax = 0.0;
+                rtc_trav_slots = 0u;
+                rtc_trav_records = 0u;
+                rtc_trav_origin = vec3(1e30);
+                rtc_trav_direction = vec3(0.0);
+                rtc_trav_inverse = vec3(1.0);
                 rtc_trace_restore(0u);
                 rtc_turns = 0u;
             }
