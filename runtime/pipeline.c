@@ -53,6 +53,16 @@ static VkResult check_limit(RtrDevice d, const char* name, uint32_t used, uint32
                      name, limit, used);
 }
 
+static VkResult check_sets(RtrDevice d, const RtrModule* m, uint32_t sets) {
+    const uint32_t limit = d->limits.maxBoundDescriptorSets;
+    if (sets <= limit || m->header.reserved_set + 1 != sets)
+        return check_limit(d, "maxBoundDescriptorSets", sets, limit);
+    return rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "maxBoundDescriptorSets",
+                     "maxBoundDescriptorSets is %u, and rtc's own descriptors are in set %u; compile with "
+                     "--reserved=SET.BINDING to put them behind the bindings of one of your sets",
+                     limit, m->header.reserved_set);
+}
+
 static VkResult check_limits(RtrDevice d, const RtrModule* m, const RtrTraceOptions* o, uint32_t sets,
                              uint32_t push) {
     const VkPhysicalDeviceLimits* l = &d->limits;
@@ -68,7 +78,7 @@ static VkResult check_limits(RtrDevice d, const RtrModule* m, const RtrTraceOpti
         (r = check_limit(d, "maxPerStageDescriptorSamplers", m->samplers,
                          l->maxPerStageDescriptorSamplers)) ||
         (r = check_limit(d, "maxPerStageResources", m->total, l->maxPerStageResources)) ||
-        (r = check_limit(d, "maxBoundDescriptorSets", sets, l->maxBoundDescriptorSets)) ||
+        (r = check_sets(d, m, sets)) ||
         (r = check_limit(d, "maxPushConstantsSize", push, l->maxPushConstantsSize)) ||
         (r = check_limit(d, "maxComputeWorkGroupInvocations", o->workgroupSize,
                          l->maxComputeWorkGroupInvocations)) ||

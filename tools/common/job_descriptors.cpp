@@ -10,7 +10,7 @@ namespace rtc::tools {
 JobDescriptors::JobDescriptors(
     const Context& context, const std::vector<JobBinding>& bindings, VkShaderStageFlags stages,
     VkDescriptorType structure_type,
-    const std::function<void(VkDescriptorSet, uint32_t, uint32_t)>& write_structure)
+    const std::function<void(VkDescriptorSet, uint32_t, uint32_t)>& write_structure, const ExtraBindings& extra)
     : device_(context.device) {
     auto type_of = [&](const JobBinding& binding) {
         return binding.acceleration_structure ? structure_type : binding.type;
@@ -21,12 +21,16 @@ JobDescriptors::JobDescriptors(
         set_count = std::max(set_count, binding.set + 1);
         counts[type_of(binding)] += binding.count;
     }
+    if (!extra.bindings.empty()) set_count = std::max(set_count, extra.set + 1);
+    for (const VkDescriptorSetLayoutBinding& binding : extra.bindings)
+        counts[binding.descriptorType] += binding.descriptorCount;
     if (set_count == 0) return;
     for (uint32_t set = 0; set < set_count; ++set) {
         std::vector<VkDescriptorSetLayoutBinding> list;
         for (const JobBinding& binding : bindings)
             if (binding.set == set)
                 list.push_back({binding.binding, type_of(binding), binding.count, stages, nullptr});
+        if (set == extra.set) list.insert(list.end(), extra.bindings.begin(), extra.bindings.end());
         VkDescriptorSetLayoutCreateInfo info{};
         info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO;
         info.bindingCount = uint32_t(list.size());

@@ -11,13 +11,20 @@
 
 namespace rtc::tools {
 
+// Bindings of one set that somebody else writes.
+struct ExtraBindings {
+    uint32_t set = 0;
+    std::vector<VkDescriptorSetLayoutBinding> bindings;
+};
+
 class JobDescriptors {
   public:
     // `structure_type` is what an acceleration structure's descriptor is to the executor, which writes
     // those itself through `write_structure(set, binding, element)`.
     JobDescriptors(const Context& context, const std::vector<JobBinding>& bindings, VkShaderStageFlags stages,
                    VkDescriptorType structure_type,
-                   const std::function<void(VkDescriptorSet, uint32_t, uint32_t)>& write_structure);
+                   const std::function<void(VkDescriptorSet, uint32_t, uint32_t)>& write_structure,
+                   const ExtraBindings& extra = {});
     ~JobDescriptors();
     JobDescriptors(const JobDescriptors&) = delete;
     JobDescriptors& operator=(const JobDescriptors&) = delete;

@@ -20,6 +20,24 @@ std::vector<RtrSbtRecord> convert(const std::vector<JobRecord>& records) {
     return converted;
 }
 
+// The module's own bindings when they are in one of the job's sets (rtc --reserved=SET.BINDING).
+ExtraBindings bindings_inside(const RtcDevice& device, const RayTracingJob& job,
+                                              const std::vector<uint32_t>& module) {
+    ExtraBindings extra;
+    const size_t bytes = module.size() * sizeof(uint32_t);
+    uint32_t count = 0;
+    device.check(rtrGetReservedBindings(device.handle, module.data(), bytes, &extra.set, &count, nullptr),
+                 "rtrGetReservedBindings");
+    bool inside = false;
+    for (const JobBinding& binding : job.bindings) inside = inside || binding.set >= extra.set;
+    if (!inside) return extra;
+    extra.bindings.resize(count);
+    device.check(rtrGetReservedBindings(device.handle, module.data(), bytes, &extra.set, &count,
+                                        extra.bindings.data()),
+                 "rtrGetReservedBindings");
+    return extra;
+}
+
 }  // namespace
 
 RtcLauncher::RtcLauncher(const RtcDevice& device, const RtcScene& scene, const RayTracingJob& job,
@@ -38,7 +56,8 @@ RtcLauncher::RtcLauncher(const RtcDevice& device, const RtcScene& scene, const R
             write.descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
             write.pBufferInfo = &structure;
             vkUpdateDescriptorSets(device.context.device, 1, &write, 0, nullptr);
-        });
+        },
+        bindings_inside(device, job, module));
     const auto start = std::chrono::steady_clock::now();
     VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, uint32_t(job.push_constants.size())};
     RtrRayTracingPipelineCreateInfo info{};
@@ -93,6 +112,16 @@ void RtcLauncher::make_recorder(const RtcScene& scene) {
     recorderInfo.controlSize = control_size;
     device_.check(rtrCreateRecorder(device_.handle, &recorderInfo, nullptr, &recorder_), "rtrCreateRecorder");
     heap_ = scene.heap;
+    if (!info().reservedInAppSet) return;
+    RtrReservedDescriptors reserved{};
+    reserved.heap = heap_;
+    reserved.recorder = recorder_;
+    reserved.raygenBuffer = reserved.missBuffer = reserved.hitBuffer = reserved.callableBuffer = table_.handle;
+    reserved.launchScratch = scratch_.handle;
+    reserved.launchScratchSize = scratch_.size;
+    device_.check(rtrWriteReservedDescriptors(device_.handle, pipeline_, descriptors_->sets.at(info().reservedSet),
+                                              &reserved),
+                  "rtrWriteReservedDescriptors");
 }
 
 void RtcLauncher::record(VkCommandBuffer commands, const std::vector<uint8_t>& push_constants) {
@@ -103,10 +132,14 @@ void RtcLauncher::record(VkCommandBuffer commands, const std::vector<uint8_t>& p
             device_.check(rtrCmdSetLaunchScratch(recorder_, scratch_.handle, 0, scratch_.size),
                           "rtrCmdSetLaunchScratch");
         device_.check(rtrCmdBindPipeline(recorder_, pipeline_), "rtrCmdBindPipeline");
-        if (!descriptors_->sets.empty())
-            device_.check(rtrCmdBindDescriptorSets(recorder_, 0, uint32_t(descriptors_->sets.size()),
-                                                   descriptors_->sets.data(), 0, nullptr),
-                          "rtrCmdBindDescriptorSets");
+        // A set that holds the module's own bindings is the last of its bind call.
+        const uint32_t count = uint32_t(descriptors_->sets.size());
+        const uint32_t split = info().reservedInAppSet ? info().reservedSet + 1 : count;
+        for (const auto& [first, end] : {std::pair(0u, split), std::pair(split, count)})
+            if (end > first)
+                device_.check(rtrCmdBindDescriptorSets(recorder_, first, end - first,
+                                                       &descriptors_->sets[first], 0, nullptr),
+                              "rtrCmdBindDescriptorSets");
         recording_ = commands;
     }
     if (!push_constants.empty())

@@ -56,7 +56,8 @@ JobShader shader(JobStage stage, const char* file) {
     return result;
 }
 
-TEST(Seed, CorrectedShadersDrawTheSolidTexture) {
+// `reserved`: the set whose bindings from 16 on are rtc's own; -1: a set above the seed's four.
+void draw_the_solid_texture(int reserved) {
     Context context;
     const RtcDevice device(context);
 
@@ -106,7 +107,11 @@ TEST(Seed, CorrectedShadersDrawTheSolidTexture) {
 
     CompileOptions options;
     options.resumable = device.support.needsResumableModules;
+    options.reserved_set = reserved;
+    options.reserved_binding = reserved < 0 ? 0 : 16;
     RtcLauncher launcher(device, structures, job, compile_job(job.pipeline, options).words);
+    EXPECT_EQ(launcher.info().reservedSet, reserved < 0 ? 4u : uint32_t(reserved));
+    EXPECT_EQ(launcher.info().reservedInAppSet == VK_TRUE, reserved >= 0);
     context.run([&](VkCommandBuffer commands) { launcher.record(commands, {}); });
     launcher.finish();
 
@@ -129,6 +134,13 @@ TEST(Seed, CorrectedShadersDrawTheSolidTexture) {
         }
     EXPECT_GT(inside, 40);
     EXPECT_TRUE(context.validation_messages().empty());
+}
+
+TEST(Seed, CorrectedShadersDrawTheSolidTexture) { draw_the_solid_texture(-1); }
+
+// As on a device with no set beyond the guaranteed four.
+TEST(Seed, CorrectedShadersDrawInTheirFourSetsAlone) {
+    for (int set : {0, 3}) draw_the_solid_texture(set);
 }
 
 }  // namespace
