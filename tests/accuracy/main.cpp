@@ -1,3 +1,4 @@
+#include <cstdio>
 #include <map>
 #include <memory>
 
@@ -35,8 +36,12 @@ DeviceTracer& shared_tracer(Variant variant) {
 
 int main(int argc, char** argv) {
     testing::InitGoogleTest(&argc, argv);
-    const int result = RUN_ALL_TESTS();
+    int result = RUN_ALL_TESTS();
     rtc::lab::tracers.clear();
+    if (rtc::lab::context && !rtc::lab::context->validation_messages().empty()) {
+        std::fprintf(stderr, "the validation layers spoke: see above\n");
+        result = 1;
+    }
     rtc::lab::context.reset();
     return result;
 }

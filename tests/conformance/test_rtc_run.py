@@ -89,5 +89,54 @@ class RtcRun(unittest.TestCase):
         self.fails("is a buffer", "--case", self.case(5), "-o", os.path.join(self.folder.name, "out.png"))
         self.fails("unknown key", "--case", self.case(5, colour="red"))
 
+    def test_ten_times_the_loop_iterations_lavapipe_has(self):
+        """lavapipe 22.3 gives the loops of a group 65 535 iterations; these shaders need more than ten times that."""
+        shaders = [self.file("long.rgen", LONG), self.file("long.rchit", LONG_HIT), self.file("long.rmiss", LONG_MISS)]
+        scene = self.file("s.json", '{"meshes": [{"triangles": [0,0,0, 1,0,0, 0,1,0]}], "instances": [{"mesh": 0}]}')
+        bind = ["--scene", scene, "--size", "16x1", "--bind", "0.1=" + json.dumps({"size": 4 * 32})]
+        path = os.path.join(self.folder.name, "out.json")
+        code, said = run(*shaders, *bind, "--rounds", "512", "-o", "0.1=" + path)
+        self.assertEqual(code, 0, said)
+        with open(path) as file:
+            found = json.load(file)["r"]
+        for lane in range(16):
+            x = lane
+            for _ in range(LOOP):
+                x = (x * 1664525 + 1013904223) & 0xffffffff
+            total = 0
+            for i in range(TRACES):
+                total = (total * 3 + (7 if (i + lane) & 1 else 1)) & 0xffffffff
+            self.assertEqual(found[2 * lane:2 * lane + 2], [x, total], lane)
+
+    def test_too_few_rounds_are_an_error_that_says_so(self):
+        shaders = [self.file("long.rgen", LONG), self.file("long.rchit", LONG_HIT), self.file("long.rmiss", LONG_MISS)]
+        self.fails("--rounds allows more", *shaders, "--size", "16x1", "--bind", "0.1=" + json.dumps({"size": 128}),
+                   "--rounds", "4", "--resumable", "1", "--step-budget", "4096")
+
+
+LOOP, TRACES = 700_000, 20_000
+LONG = f"""#version 460
+#extension GL_NV_ray_tracing : require
+layout(set = 0, binding = 0) uniform accelerationStructureNV scene;
+layout(set = 0, binding = 1, std430) buffer Result {{ uint r[]; }};
+layout(location = 0) rayPayloadNV uint payload;
+void main() {{
+    uint lane = gl_LaunchIDNV.x, x = lane, total = 0u;
+    for (uint i = 0u; i < {LOOP}u; ++i) x = x * 1664525u + 1013904223u;
+    for (uint i = 0u; i < {TRACES}u; ++i) {{
+        float side = ((i + lane) & 1u) != 0u ? 40.0 : 0.25;
+        traceNV(scene, 0u, 0xffu, 0u, 0u, 0u, vec3(side, 0.25, 1.0), 0.0, vec3(0.0, 0.0, -1.0), 10.0, 0);
+        total = total * 3u + payload;
+    }}
+    r[2u * lane] = x;
+    r[2u * lane + 1u] = total;
+}}
+"""
+LONG_HIT = """#version 460
+#extension GL_NV_ray_tracing : require
+layout(location = 0) rayPayloadInNV uint payload;
+void main() { payload = 1u; }
+"""
+LONG_MISS = LONG_HIT.replace("1u", "7u")
 
 unittest.main()

@@ -102,7 +102,7 @@ A pipeline file:
                 {"name": "glass", "closestHit": "c", "anyHit": "a"} ] }
 "kind", "entry", "spec" and "groups" may be left out.
 
-Exit status: 0 success, 1 errors in the inputs, 2 errors on the command line.
+Exit status: 0 success, 1 errors in the inputs or on the command line (as glslc).
 )",
         stdout);
 }

@@ -299,7 +299,7 @@ int run(const std::vector<std::string>& words) {
         return Program(arguments).run();
     } catch (const UsageError& error) {
         std::fprintf(stderr, "rtc: error: %s\n", error.what());
-        return 2;
+        return 1;
     } catch (const InputError& error) {
         std::fprintf(stderr, "%s\n", error.what());
         return 1;

@@ -16,7 +16,7 @@ struct CommandLine {
     std::string scene, size, native_kind, device, case_file, push, table, suite, filter, json, save, oracle,
         save_oracle;
     bool compare = false, validate = false, list = false, verbose = false, optimize = false, print = false;
-    uint32_t recursion = 0, callable_depth = 0, repeats = 1, budget = 0, timeout = 120;
+    uint32_t recursion = 0, callable_depth = 0, repeats = 1, budget = 0, rounds = 0, timeout = 120;
     int resumable = -1, fetch = -1;
     Tolerance tolerance;
 };
@@ -187,6 +187,7 @@ int run(const CommandLine& c) {
     rtc.optimize = c.optimize;
     rtc.resumable = c.resumable;
     rtc.step_budget = c.budget;
+    rtc.rounds = c.rounds;
     rtc.fetch = c.fetch;
     rtc.save_module = c.save;
     if (!c.suite.empty()) {
@@ -295,6 +296,7 @@ int main(int argc, char** argv) {
                    "0 or 1: compile lanes that can suspend (default: as the device needs)");
     app.add_option("--fetch", c.fetch, "acceleration structure through 0 texels, 1 a storage buffer");
     app.add_option("--step-budget", c.budget, "loop turns before a lane suspends");
+    app.add_option("--rounds", c.rounds, "how often suspended lanes may go on (64)")->check(CLI::Range(1, 16384));
     app.add_option("--save-module", c.save, "write the module rtc linked");
     app.add_flag("--validate", c.validate, "run under the Khronos validation layer");
     app.add_option("--case", c.case_file, "a case file: stages, scene, bindings and expected values");

@@ -237,7 +237,7 @@ class RtcExecutor final : public Executor {
 
     void trace(VkCommandBuffer commands, const native::Launch& launch) override {
         if (!recorder_) {
-            VkDeviceSize size = rtrGetRecorderControlSize(device_, 1, 4, 64);
+            VkDeviceSize size = rtrGetRecorderControlSize(device_, 1, 4, options_.rounds ? options_.rounds : 64);
             control_ = Buffer(context_, size, RTR_CONTROL_BUFFER_USAGE, MemoryKind::Readback);
             RtrRecorderCreateInfo info{};
             info.controlBuffer = control_.handle;
@@ -253,6 +253,8 @@ class RtcExecutor final : public Executor {
         if (scratch_.handle)
             need(rtrCmdSetLaunchScratch(recorder_, scratch_.handle, 0, scratch_.size),
                  "rtrCmdSetLaunchScratch");
+        if (options_.rounds)
+            need(rtrCmdSetLaunchLimits(recorder_, 0, options_.rounds), "rtrCmdSetLaunchLimits");
         need(rtrCmdBindPipeline(recorder_, pipeline_), "rtrCmdBindPipeline");
         if (!launch.sets.empty())
             need(rtrCmdBindDescriptorSets(recorder_, 0, uint32_t(launch.sets.size()), launch.sets.data(), 0,
@@ -282,6 +284,7 @@ class RtcExecutor final : public Executor {
                 char line[512];
                 rtrFormatLaunchError(&error, line, sizeof(line));
                 text = std::string(launch_error_name(error.code)) + ": " + line;
+                if (error.suspendedLanes) text += "; --rounds allows more";
             }
         }
         need(rtrRetireRecorder(recorder_), "rtrRetireRecorder");

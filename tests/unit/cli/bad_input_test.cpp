@@ -10,7 +10,7 @@ class BadInput : public Cli {};
 
 TEST_F(BadInput, NoInput) {
     const CliRun run = rtc("");
-    EXPECT_EQ(run.status, 2);
+    EXPECT_EQ(run.status, 1);
     EXPECT_EQ(run.err, "rtc: error: no input files\n");
 }
 
@@ -19,7 +19,7 @@ TEST_F(BadInput, UnknownOptions) {
     for (const char* option :
          {"-fnothing", "--nothing", "--nothing=3", "-Z", "--report=yes", "-mfmt", "-Wall", "-std"}) {
         const CliRun run = rtc("a.rmiss " + std::string(option));
-        EXPECT_EQ(run.status, 2) << option;
+        EXPECT_EQ(run.status, 1) << option;
         EXPECT_THAT(run.err, StartsWith("rtc: error: unknown argument: '" + std::string(option) + "'"))
             << option;
     }
@@ -30,7 +30,7 @@ TEST_F(BadInput, OptionsWithoutTheirValue) {
          {"-o", "-D", "-U", "-I", "-MF", "-MT", "-x", "--hit-group", "--stage", "--pipeline", "--reflect",
           "--target-env", "--max-recursion-depth", "--max-callable-depth", "--reserved", "--dump-after"}) {
         const CliRun run = rtc("a.rmiss " + std::string(option));
-        EXPECT_EQ(run.status, 2) << option;
+        EXPECT_EQ(run.status, 1) << option;
         EXPECT_THAT(run.err, HasSubstr("argument to '" + std::string(option) + "' is missing")) << option;
     }
 }
