@@ -153,6 +153,15 @@ BottomReference::BottomReference(const Content& content) : content_(content) {
     build(0, 0, uint32_t(slots_.size()));
 }
 
+double BottomReference::reach() const {
+    double largest = 0;
+    if (!nodes_.empty())
+        for (int k = 0; k < 3; ++k)
+            largest =
+                std::max({largest, std::fabs(double(nodes_[0].min[k])), std::fabs(double(nodes_[0].max[k]))});
+    return largest;
+}
+
 void BottomReference::bounds(const Slot& slot, float* min, float* max) const {
     const Geometry& g = content_.geometries[slot.geometry];
     for (int i = 0; i < 3; ++i) {

@@ -41,6 +41,7 @@ class BottomReference {
     // Candidates of the ray, facing, flags and instances not considered. `brute`: without the tree.
     void candidates(const ObjectRay& ray, bool brute, std::vector<Candidate>& out, uint64_t& tests) const;
     bool empty() const { return slots_.empty(); }
+    double reach() const;  // the largest coordinate
     const Content& content() const { return content_; }
 
   private:

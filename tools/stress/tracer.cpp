@@ -55,7 +55,7 @@ std::vector<uint32_t> compile() {
     return words;
 }
 
-constexpr uint32_t kRounds = 64;
+constexpr uint32_t kRounds = 1024;  // worlds may be piles
 
 }  // namespace
 
@@ -218,6 +218,7 @@ std::vector<Hit> Tracer::trace(RtrHeap heap, RtrAccelerationStructure top,
     context.run([&](VkCommandBuffer commands) {
         device_.check(rtrBeginRecorder(recorder_, commands), "rtrBeginRecorder");
         device_.check(rtrCmdSetHeap(recorder_, heap), "rtrCmdSetHeap");
+        device_.check(rtrCmdSetLaunchLimits(recorder_, 0, kRounds), "rtrCmdSetLaunchLimits");
         if (scratch_.handle)
             device_.check(rtrCmdSetLaunchScratch(recorder_, scratch_.handle, 0, scratch_.size),
                           "rtrCmdSetLaunchScratch");

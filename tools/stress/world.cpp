@@ -367,6 +367,7 @@ void World::make_instances(Top& top, uint64_t count) {
     std::vector<int> keys;
     for (const auto& [key, bottom] : bottoms_) keys.push_back(key);
     const double spread = 3.0 * std::cbrt(double(count));
+    const bool pile = chance(random_, count < 1000 ? 0.3 : 0.02);
     for (uint64_t i = 0; i < count; ++i) {
         VkAccelerationStructureInstanceNV& in = top.instances[i];
         double m[3][3];
@@ -376,7 +377,11 @@ void World::make_instances(Top& top, uint64_t count) {
         if (shape == 1) m[0][0] += 2, m[1][1] += 2, m[2][2] += 2;                   // tame
         if (shape == 2) m[0][0] = -2 + m[0][0], m[1][1] += 2, m[2][2] += 2;         // mirrored
         if (shape == 3) m[0][0] += 3, m[1][1] = 0.3 + 0.1 * m[1][1], m[2][2] += 2;  // flat
-        const double scale = shape == 0 ? 1 : std::pow(10.0, between(random_, -1, 0.5));
+        if (!keys.empty() && !chance(random_, 0.05)) top.bottoms[i] = keys[below(random_, keys.size())];
+        // About as large as its distance to others: piles of thousands are no scene, but some are.
+        const double reach = top.bottoms[i] < 0 ? 1 : bottoms_.at(top.bottoms[i]).reference->reach();
+        const double fit = 1 / std::max(reach, 1e-3), wish = std::pow(10.0, between(random_, -1, 0.5));
+        const double scale = count < 100 && shape == 0 ? 1 : (pile ? wish : wish * fit);
         for (int r = 0; r < 3; ++r) {
             for (int c = 0; c < 3; ++c) in.transform.matrix[r][c] = float(scale * m[r][c]);
             in.transform.matrix[r][3] =
@@ -386,7 +391,6 @@ void World::make_instances(Top& top, uint64_t count) {
         in.mask = chance(random_, 0.7) ? 0xffu : uint32_t(random_()) & 0xffu;
         in.flags = chance(random_, 0.5) ? 0 : uint32_t(random_()) & 3u;
         if (chance(random_, 0.2)) in.flags |= chance(random_, 0.5) ? 4u : 8u;
-        if (!keys.empty() && !chance(random_, 0.05)) top.bottoms[i] = keys[below(random_, keys.size())];
     }
 }
 

@@ -1,5 +1,6 @@
-"""Every diagnostic id in the compiler's sources has a row in docs/troubleshooting.md, and the core's occur in a test
-(the front end's and the C library's tests look at messages instead).
+"""Every diagnostic id in the compiler's and the runtime's sources has a row in docs/troubleshooting.md, each with a
+cause and a remedy, and the core's occur in a test (the front end's and the C library's tests look at messages
+instead). Ids that the page explains and nothing raises are errors too.
 
 usage: diagnostics_listed.py ROOT
 """
@@ -17,7 +18,22 @@ for source in sorted((root / "compiler").rglob("*.cpp")):
     ids |= found
     if source.parts[-2] not in ("frontend", "api"):
         core |= found
-documented = set(re.findall(r"`([a-z0-9-]+)`", (root / "docs/troubleshooting.md").read_text()))
+
+# The runtime raises them through rtr_error and short names for it; the id is the first string.
+RUNTIME = re.compile(r'''\b(?:rtr_\w*error|rtr_warn\w*|bad|report|reject)\((?:[^()"]|\([^()]*\))*?
+                         "([a-zA-Z][A-Za-z0-9]*(?:-[a-z0-9]+)*)",''', re.VERBOSE)
+runtime = set()
+for source in sorted((root / "runtime").glob("*.c")):
+    text = source.read_text()
+    runtime |= set(RUNTIME.findall(text))
+    calls = len(re.findall(r"\brtr_error\(\w[^;]*?VK_ERROR", text))
+    named = len(re.findall(r'\brtr_error\(\w[^;]*?VK_ERROR[^;]*?"', text))
+    if calls != named:
+        sys.exit(f"{source}: a call of rtr_error that this script cannot read")
+rows = [line for line in (root / "docs/troubleshooting.md").read_text().splitlines() if line.startswith("| `")]
+documented = set(i for row in rows for i in re.findall(r"`([a-zA-Z0-9-]+)`", row.split("|")[1]))
+bare = [row for row in rows if len(row.strip().strip("|").split(" | ")) == 3 and not row.split("|")[2].strip()]
+ids |= runtime
 tests = "".join(p.read_text(errors="replace") for p in (root / "tests/unit").rglob("*") if p.is_file())
 # Nothing but a bug of rtc or of the optimiser raises these; no input is known that does.
 UNTESTED = {"internal-error", "internal-invalid-module", "internal-traversal", "optimizer", "instruction-too-long",
@@ -25,6 +41,9 @@ UNTESTED = {"internal-error", "internal-invalid-module", "internal-traversal", "
 
 bad = [f"{i}: no row in docs/troubleshooting.md" for i in sorted(ids - documented)]
 bad += [f"{i}: no test in tests/unit" for i in sorted(core - UNTESTED) if f'"{i}"' not in tests]
-print(f"{len(ids)} diagnostics")
+bad += [f"{row}: no cause" for row in bare]
+everything = "".join(p.read_text() for p in (root / "compiler").rglob("*.cpp"))
+bad += [f"{i}: explained, and nothing raises it" for i in sorted(documented - ids) if f'"{i}"' not in everything]
+print(f"{len(ids)} diagnostics, {len(runtime)} of them the runtime's")
 print("\n".join(bad))
 sys.exit(1 if bad or len(ids) < 40 else 0)
