@@ -20,7 +20,7 @@ for source in sorted((root / "compiler").rglob("*.cpp")):
         core |= found
 
 # The runtime raises them through rtr_error and short names for it; the id is the first string.
-RUNTIME = re.compile(r'''\b(?:rtr_\w*error|rtr_warn\w*|bad|report|reject)\((?:[^()"]|\([^()]*\))*?
+RUNTIME = re.compile(r'''\b(?:rtr_\w*error|rtr_warn\w*|bad|report|reject|check_limit)\((?:[^()"]|\([^()]*\))*?
                          "([a-zA-Z][A-Za-z0-9]*(?:-[a-z0-9]+)*)",''', re.VERBOSE)
 runtime = set()
 for source in sorted((root / "runtime").glob("*.c")):
