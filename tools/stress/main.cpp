@@ -16,7 +16,7 @@ struct Options {
     uint64_t seed = 1, steps = 25, seeds = 1;
     stress::Limits limits;
     uint64_t heap_mb = 1024;
-    std::string device, json;
+    std::string device, json, addressing = "heap";
     bool validate = false, quiet = false;
     double seconds = 0;
 };
@@ -69,8 +69,10 @@ int run(const Options& options) {
     tools::ContextOptions context_options;
     context_options.device = options.device;
     context_options.validate = options.validate;
+    const bool addresses = options.addressing == "address";
+    context_options.all_core_features = addresses;
     const tools::Context context(context_options);
-    stress::Device device(context);
+    stress::Device device(context, addresses);
     const auto start = std::chrono::steady_clock::now();
     auto elapsed = [&] {
         return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -99,6 +101,7 @@ int run(const Options& options) {
     const long long leaked = device.close();
     nlohmann::ordered_json json = report(sum);
     json["device"] = tools::describe_device(context.properties, context.driver);
+    json["addressing"] = options.addressing;
     json["first seed"] = options.seed;
     json["seeds"] = done;
     json["differences"] = 0;
@@ -136,6 +139,8 @@ int main(int argc, char** argv) {
     app.add_option("--heap-mb", options.heap_mb, "memory of the acceleration structures")
         ->check(CLI::Range(16, 65536));
     app.add_option("--seconds", options.seconds, "stop after this time");
+    app.add_option("--addressing", options.addressing, "how structures are reached")
+        ->check(CLI::IsMember({"heap", "address"}));
     app.add_option("--device", options.device, "a part of the device's name, or its number");
     app.add_option("--json", options.json, "write the counts there too");
     app.add_flag("--validate", options.validate, "under the validation layers, synchronisation included");

@@ -35,6 +35,11 @@ bool test_triangle(const ObjectRay& ray, const Triangle& v, double vertex_error,
     }
     const double largest = std::max({reach[0], reach[1], reach[2]});
     const double delta = kU * (4 * largest + 11 * reach[2] + vertex_error * size) + 1e-36;
+    // A triangle without area has no edge that tells sides.
+    for (const double* axis : {x, y}) {
+        if (std::min({axis[0], axis[1], axis[2]}) > delta || std::max({axis[0], axis[1], axis[2]}) < -delta)
+            return false;
+    }
     double edge[3], error[3], sum = 0, sum_error = 0;
     bool positive = false, negative = false, all_certain = true;
     for (int i = 0; i < 3; ++i) {

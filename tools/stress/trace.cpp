@@ -82,9 +82,14 @@ std::vector<Ray> World::make_rays(const std::vector<InstanceReference>& instance
     for (Ray& ray : rays) {
         Vec3 target{float(between(random_, -5, 5)), float(between(random_, -5, 5)),
                     float(between(random_, -5, 5))};
+        double size = 1;  // of what is aimed at
         if (!full.empty()) {
             const uint32_t i = full[below(random_, full.size())];
             const Content& content = instances[i].bottom->content();
+            float stretch = 0;
+            for (const auto& row : top_->instances[i].transform.matrix)
+                for (int k = 0; k < 3; ++k) stretch = std::max(stretch, std::fabs(row[k]));
+            size = std::max(1e-3, instances[i].bottom->reach() * stretch);
             const Geometry& g = content.geometries[below(random_, content.geometries.size())];
             if (g.primitives()) {
                 const Vec3 p = point_of(g, below(random_, g.primitives()), random_);
@@ -95,7 +100,9 @@ std::vector<Ray> World::make_rays(const std::vector<InstanceReference>& instance
                     target = world;
             }
         }
-        const double away = std::pow(10.0, between(random_, -1, 1.5));
+        // Rays from afar are known to fewer digits than small things need: most start near.
+        const double away = chance(random_, 0.8) ? size * std::pow(10.0, between(random_, -1, 0.7))
+                                                 : std::pow(10.0, between(random_, -1, 1.5));
         float offset[3];
         for (float& o : offset) o = float(between(random_, -away, away));
         if (chance(random_, 0.15)) offset[below(random_, 3)] = 0;
@@ -124,7 +131,8 @@ void World::trace() {
     // matter.
     std::vector<InstanceReference> instances(top_->instances.size());
     const std::vector<uint8_t> block =
-        tools::download_buffer(device_.context, heap_buffer_, top_->structure.offset, top_->structure.size);
+        tools::download_buffer(device_.context, heap_ ? heap_buffer_ : *top_->structure.buffer,
+                               top_->structure.offset, top_->structure.size);
     auto word = [&](size_t at) {
         uint32_t w = 0;
         if (at * 4 + 4 > block.size()) throw Error("the top level's header points outside of it");

@@ -24,11 +24,12 @@ VKAPI_ATTR VkBool32 VKAPI_CALL collect(VkDebugUtilsMessageSeverityFlagBitsEXT,
     return VK_FALSE;
 }
 
-std::vector<uint32_t> compile() {
+std::vector<uint32_t> compile(bool addresses) {
     rtcc_compiler_t compiler = rtcc_compiler_create();
     rtcc_pipeline_t pipeline = rtcc_pipeline_create();
     rtcc_options_t options = rtcc_options_create();
     rtcc_options_set_optimization(options, RTCC_OPTIMIZATION_PERFORMANCE);
+    rtcc_options_set_addressing(options, addresses ? RTCC_ADDRESSING_ADDRESS : RTCC_ADDRESSING_HEAP);
     auto add = [&](rtcc_stage stage, const char* name, const std::string& text) {
         return rtcc_pipeline_add_glsl(pipeline, stage, name, name, text.data(), text.size());
     };
@@ -96,7 +97,7 @@ void* VKAPI_CALL Device::reallocate(void* user, void* old, size_t size, size_t a
     return fresh;
 }
 
-Device::Device(const tools::Context& c) : context(c) {
+Device::Device(const tools::Context& c, bool use_addresses) : context(c), addresses(use_addresses) {
     tools::check(rtrGetPhysicalDeviceSupport(c.instance, c.physical, vkGetInstanceProcAddr, &support),
                  "rtrGetPhysicalDeviceSupport");
     callbacks_ = {&live_, allocate, reallocate, release, nullptr, nullptr};
@@ -113,6 +114,7 @@ Device::Device(const tools::Context& c) : context(c) {
     info.device = c.device;
     info.pfnGetInstanceProcAddr = vkGetInstanceProcAddr;
     info.pMessenger = &messenger;
+    info.bufferDeviceAddress = addresses;
     check(rtrCreateDevice(&info, &callbacks_, &handle), "rtrCreateDevice");
 }
 
@@ -150,7 +152,7 @@ Tracer::Tracer(Device& device) : device_(device) {
     allocation.pSetLayouts = &layout_;
     tools::check(vkAllocateDescriptorSets(context.device, &allocation, &set_), "vkAllocateDescriptorSets");
 
-    const std::vector<uint32_t> words = compile();
+    const std::vector<uint32_t> words = compile(device.addresses);
     RtrRayTracingPipelineCreateInfo info{};
     info.pCode = words.data();
     info.codeSize = words.size() * 4;
@@ -217,7 +219,7 @@ std::vector<Hit> Tracer::trace(RtrHeap heap, RtrAccelerationStructure top,
 
     context.run([&](VkCommandBuffer commands) {
         device_.check(rtrBeginRecorder(recorder_, commands), "rtrBeginRecorder");
-        device_.check(rtrCmdSetHeap(recorder_, heap), "rtrCmdSetHeap");
+        if (heap) device_.check(rtrCmdSetHeap(recorder_, heap), "rtrCmdSetHeap");
         device_.check(rtrCmdSetLaunchLimits(recorder_, 0, kRounds), "rtrCmdSetLaunchLimits");
         if (scratch_.handle)
             device_.check(rtrCmdSetLaunchScratch(recorder_, scratch_.handle, 0, scratch_.size),

@@ -15,12 +15,14 @@ namespace rtc::stress {
 // The runtime with host allocations counted and its messages kept.
 class Device {
   public:
-    explicit Device(const tools::Context& context);
+    // `addresses`: address mode, for a context with device addresses.
+    Device(const tools::Context& context, bool addresses);
     ~Device();
     Device(const Device&) = delete;
     Device& operator=(const Device&) = delete;
 
     const tools::Context& context;
+    const bool addresses;
     RtrDevice handle = nullptr;
     RtrPhysicalDeviceSupport support{};
     void check(VkResult result, const char* call);  // throws tools::Error with the runtime's words
@@ -57,6 +59,7 @@ class Tracer {
     Tracer& operator=(const Tracer&) = delete;
 
     RtrRecorder recorder() const { return recorder_; }  // for builds too
+    // `heap`: null in address mode.
     std::vector<Hit> trace(RtrHeap heap, RtrAccelerationStructure top, const std::vector<HitRecord>& records,
                            const std::vector<float>& boxes, const std::vector<Ray>& rays);
 

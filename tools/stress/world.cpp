@@ -104,6 +104,7 @@ struct World::Inputs {
 
 World::World(Device& device, const Limits& limits, uint64_t seed)
     : device_(device), limits_(limits), random_(seed), tracer_(device) {
+    if (device.addresses) return;
     heap_buffer_ = Buffer(device.context, limits.heap_bytes, RTR_HEAP_BUFFER_USAGE, MemoryKind::Device);
     RtrHeapCreateInfo info{};
     info.buffer = heap_buffer_.handle;
@@ -128,6 +129,7 @@ void World::finish() {
     bottoms_.clear();
     if (top_) destroy(top_->structure);
     top_.reset();
+    if (!heap_) return;
     VkDeviceSize offset = 0;  // all but the null structure's 256 bytes
     device_.check(rtrAllocateHeapRange(heap_, limits_.heap_bytes - 256, 256, &offset),
                   "the heap is not whole after everything was destroyed: rtrAllocateHeapRange");
@@ -149,6 +151,21 @@ void World::record(const std::function<void(RtrRecorder)>& commands) {
     device_.check(rtrRetireRecorder(tracer_.recorder()), "rtrRetireRecorder");
 }
 
+// Finds memory for it; false when there is no room.
+bool World::place(Structure& s) {
+    if (heap_) {
+        const bool placed = rtrAllocateHeapRange(heap_, s.size, 0, &s.offset) == VK_SUCCESS;
+        device_.messages.clear();
+        return placed;
+    }
+    if (used_ + s.size > limits_.heap_bytes) return false;
+    used_ += s.size;
+    s.offset = 256 * below(random_, 4);
+    s.buffer = std::make_shared<Buffer>(device_.context, s.offset + s.size, RTR_ADDRESS_BUFFER_USAGE,
+                                        MemoryKind::Device);
+    return true;
+}
+
 // A handle of null when the heap has no room even after others were destroyed.
 World::Structure World::create(const VkAccelerationStructureInfoNV& info, VkDeviceSize compacted_size) {
     VkAccelerationStructureCreateInfoNV create_info{};
@@ -163,8 +180,7 @@ World::Structure World::create(const VkAccelerationStructureInfoNV& info, VkDevi
     rtrGetAccelerationStructureMemoryRequirements(
         device_.handle, VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_OBJECT_NV, s.handle, &needs);
     s.size = needs.memoryRequirements.size;
-    while (rtrAllocateHeapRange(heap_, s.size, 0, &s.offset) != VK_SUCCESS) {
-        device_.messages.clear();
+    while (!place(s)) {
         if (evict(in_use_)) continue;
         rtrDestroyAccelerationStructure(device_.handle, s.handle, nullptr);
         return {};
@@ -172,7 +188,12 @@ World::Structure World::create(const VkAccelerationStructureInfoNV& info, VkDevi
     RtrBindAccelerationStructureMemoryInfo bind{};
     bind.accelerationStructure = s.handle;
     bind.heap = heap_;
-    bind.heapOffset = s.offset;
+    if (heap_) {
+        bind.heapOffset = s.offset;
+    } else {
+        bind.buffer = s.buffer->handle;
+        bind.bufferOffset = s.offset;
+    }
     device_.check(rtrBindAccelerationStructureMemory(device_.handle, 1, &bind),
                   "rtrBindAccelerationStructureMemory");
     return s;
@@ -181,7 +202,11 @@ World::Structure World::create(const VkAccelerationStructureInfoNV& info, VkDevi
 void World::destroy(Structure& s) {
     if (!s.handle) return;
     rtrDestroyAccelerationStructure(device_.handle, s.handle, nullptr);
-    rtrFreeHeapRange(heap_, s.offset);
+    if (heap_) {
+        rtrFreeHeapRange(heap_, s.offset);
+    } else {
+        used_ -= s.size;
+    }
     s = {};
 }
 

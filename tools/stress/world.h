@@ -48,7 +48,8 @@ class World {
   private:
     struct Structure {
         RtrAccelerationStructure handle = nullptr;
-        VkDeviceSize offset = 0, size = 0;
+        VkDeviceSize offset = 0, size = 0;      // in the heap, or in its own buffer
+        std::shared_ptr<tools::Buffer> buffer;  // address mode
     };
     struct Bottom {
         Content content;
@@ -71,6 +72,7 @@ class World {
     Structure create(const VkAccelerationStructureInfoNV& info, VkDeviceSize compacted_size);
     void destroy(Structure& structure);
     bool evict(int keep);
+    bool place(Structure& structure);
     void record(const std::function<void(RtrRecorder)>& commands);
     VkDeviceSize scratch_size(RtrAccelerationStructure structure, bool update);
     void build(Bottom& bottom, bool update, Structure* target);
@@ -98,7 +100,8 @@ class World {
     Random random_;
     Tracer tracer_;
     tools::Buffer heap_buffer_;
-    RtrHeap heap_ = nullptr;
+    RtrHeap heap_ = nullptr;  // null in address mode
+    VkDeviceSize used_ = 0;   // bytes bound to buffers
     std::map<int, Bottom> bottoms_;
     int next_key_ = 0, in_use_ = -1;
     std::unique_ptr<Top> top_;
