@@ -226,6 +226,9 @@ class Reader {
             default: break;
         }
         if (!in_function_) {
+            // SPIR-V 2.4: functions come last. What a value's type is would depend on the order otherwise.
+            if (!module_.functions.empty())
+                malformed(std::string(op_info(inst.op)->name) + " stands behind a function");
             if (inst.op == Op::OpTypeInt && inst.ops[0] == 64) wide_ints_.insert(inst.result);
             module_.globals.push_back(std::move(inst));
             return;
