@@ -236,7 +236,10 @@ class Reader {
         if (!block_open_) malformed("an instruction stands outside a block");
         const bool ends = inst.is_terminator();
         module_.functions.back().blocks.back().insts.push_back(std::move(inst));
-        if (ends) block_open_ = false;
+        if (ends) {
+            block_open_ = false;
+            line_ = {};  // SPIR-V 3.52.2: a line ends with its block
+        }
     }
 
     uint32_t file_index(const std::string& name) {

@@ -51,9 +51,12 @@ class Writer {
                 for (const Inst& inst : block.insts) {
                     // OpLine must not stand between a merge instruction and its terminator.
                     const bool after_merge = &inst != block.insts.data() && (&inst - 1)->is_merge();
-                    if (debug_ && inst.source.file && !(inst.source == current) && !after_merge &&
-                        inst.op != Op::OpVariable && inst.op != Op::OpPhi) {
-                        emit(Inst(Op::OpLine, 0, 0, {file_ids[inst.source.file], inst.source.line, 0}));
+                    if (debug_ && !(inst.source == current) && !after_merge && inst.op != Op::OpVariable &&
+                        inst.op != Op::OpPhi) {
+                        if (inst.source.file)
+                            emit(Inst(Op::OpLine, 0, 0, {file_ids[inst.source.file], inst.source.line, 0}));
+                        else
+                            emit(Inst(Op::OpNoLine, 0, 0, {}));
                         current = inst.source;
                     }
                     emit(inst);

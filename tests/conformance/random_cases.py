@@ -3,10 +3,12 @@
 
   random_cases.py FOLDER FIRST_SEED COUNT [SIZE]      SIZE 1 (default) to 3: statements a shader
 
-Each seed becomes a case file: ray generation, closest-hit, miss, any-hit and callable shaders made of nested
-control flow, helper functions, traces and callables at random places, and live values of random types. Every
-construct is built together with its meaning in Python, so the expectation comes from interpreting the program
-here: integers wrap, floats stay small multiples of 1/4, nothing depends on the driver.
+Each seed becomes a case file: ray generation, closest-hit, miss, any-hit, intersection and callable shaders made
+of nested control flow, helper functions, traces, reports and callables at random places, live values of random
+types, built-ins and records read at random places, also after nested traces. Every construct is built together
+with its meaning in Python, so the expectation comes from interpreting the program here: integers wrap, floats
+stay small multiples of 1/8, nothing depends on the driver. Two of three seeds are `rich`: two or more stages
+trace, and one holds 30 or more variables alive across a trace.
 """
 import json
 import os
@@ -16,11 +18,11 @@ import sys
 sys.dont_write_bytecode = True
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import suite
+from random_types import EXTENSIONS, M, STRUCTS, TYPES
 
-M = 0xFFFFFFFF
 LANES = 8
-MAX_DEPTH = 3       # trace calls nested in trace calls
-MAX_CALLS = 4000    # stage invocations of one lane; programs that need more are drawn again
+MAX_CALLS = 3000    # stage invocations of one lane; programs that need more are drawn again
+MAX_REPORTS = 60    # of one intersection shader: keeps every distance different
 
 
 class TooLong(Exception):
@@ -35,66 +37,46 @@ class Continue(Exception):
     pass
 
 
-class Type:
-    """A type of live values: how a uint becomes one, and how one becomes a uint again."""
-
-    def __init__(self, name, default, store, load, array=""):
-        self.name, self.default, self.store, self.load, self.array = name, default, store, load, array
+class Ignore(Exception):  # ends an any-hit shader
+    pass
 
 
-def set_item(old, index, value):
-    new = list(old)
-    new[index] = value
-    return new
+class Terminate(Exception):
+    pass
 
 
-# store(v, e) -> GLSL statements; second entry computes the value. load(v) -> GLSL of a uint.
-TYPES = [
-    Type("uint", 0, (lambda v, e: f"{v} = {e};", lambda old, n: n), (lambda v: v, lambda x: x)),
-    Type("int", 0, (lambda v, e: f"{v} = int({e}) >> 3;", lambda old, n: (n - (1 << 32) if n >> 31 else n) >> 3),
-         (lambda v: f"uint({v})", lambda x: x & M)),
-    Type("bool", False, (lambda v, e: f"{v} = ({e} & 3u) == 1u;", lambda old, n: (n & 3) == 1),
-         (lambda v: f"({v} ? 7u : 11u)", lambda x: 7 if x else 11)),
-    Type("float", 0, (lambda v, e: f"{v} = float({e} & 0xffffu) * 0.25;", lambda old, n: n & 0xFFFF),
-         (lambda v: f"uint({v} * 4.0)", lambda x: x)),
-    Type("uvec3", (0, 0, 0), (lambda v, e: f"{v} = uvec3({e}) * uvec3(1u, 3u, 5u) + uvec3(0u, 1u, 2u);",
-                              lambda old, n: (n, (n * 3 + 1) & M, (n * 5 + 2) & M)),
-         (lambda v: f"({v}.x ^ {v}.y + {v}.z)", lambda x: (x[0] ^ (x[1] + x[2]) & M) & M)),
-    Type("uvec2", (0, 0), (lambda v, e: f"{v} = uvec2({v}.y, {e});", lambda old, n: (old[1], n)),
-         (lambda v: f"({v}.x * 3u + {v}.y)", lambda x: (x[0] * 3 + x[1]) & M)),
-    Type("bvec2", (False, False), (lambda v, e: f"{v} = bvec2(({e} & 1u) != 0u, {v}.x);", lambda old, n: (bool(n & 1), old[0])),
-         (lambda v: f"(uint({v}.x) * 2u + uint({v}.y))", lambda x: x[0] * 2 + x[1])),
-    Type("mat2", (0, 0, 0, 0), (lambda v, e: f"{v}[1][0] = float({e} & 255u); {v}[0][1] = {v}[1][1]; {v}[1][1] += 1.0;",
-                                lambda old, n: (old[0], old[3], n & 255, old[3] + 1)),
-         (lambda v: f"(uint({v}[0][1]) + uint({v}[1][0]) * 16u + uint({v}[1][1]))", lambda x: (x[1] + x[2] * 16 + x[3]) & M)),
-    Type("uint64_t", 0, (lambda v, e: f"{v} = {v} * 5ul + uint64_t({e}) * 0x100000003ul;",
-                         lambda old, n: (old * 5 + n * 0x100000003) & (2**64 - 1)),
-         (lambda v: f"(uint({v}) ^ uint({v} >> 32))", lambda x: (x ^ x >> 32) & M)),
-    Type("double", 0, (lambda v, e: f"{v} = double({e} & 0xffffu) * 0.5lf;", lambda old, n: n & 0xFFFF),
-         (lambda v: f"uint({v} * 2.0lf)", lambda x: x)),
-    Type("uint", [0] * 4, (lambda v, e: f"{v}[{e} & 3u] += {e};", lambda old, n: set_item(old, n & 3, (old[n & 3] + n) & M)),
-         (lambda v: f"({v}[0] ^ {v}[1] ^ {v}[2] ^ {v}[3])", lambda x: x[0] ^ x[1] ^ x[2] ^ x[3]), array="[4]"),
-    Type("S", (0, False, 0), (lambda v, e: f"{v}.a = {e}; {v}.b = ({e} & 4u) != 0u; {v}.c += 2.0;",
-                              lambda old, n: (n, bool(n & 4), old[2] + 2)),
-         (lambda v: f"({v}.a + ({v}.b ? uint({v}.c) : 1u))", lambda x: (x[0] + (x[2] if x[1] else 1)) & M)),
-]
-ZERO = {"uint": "0u", "int": "0", "bool": "false", "float": "0.0", "uvec3": "uvec3(0u)", "uvec2": "uvec2(0u)", "bvec2": "bvec2(false)",
-        "mat2": "mat2(0.0)", "uint64_t": "0ul", "double": "0.0lf", "S": "S(0u, false, 0.0)"}
-HEAD = ("#version 460\n#extension GL_NV_ray_tracing : require\n"
-        "#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require\n"
+class EndSearch(Exception):  # ends an intersection shader
+    pass
+
+
+HEAD = ("#version 460\n#extension GL_NV_ray_tracing : require\n" +
+        "".join(f"#extension {e} : require\n" for e in EXTENSIONS) +
         "layout(set = 0, binding = 0) uniform accelerationStructureNV scene;\n"
-        "layout(set = 0, binding = 1) buffer Out { uint r[]; };\n"
-        "struct S { uint a; bool b; float c; };\n")
+        "layout(set = 0, binding = 1) buffer Out { uint r[]; };\n" + STRUCTS)
+# Leaves of expressions that read a built-in: stage -> (GLSL, key of the frame's built-ins).
+LAUNCH = ("gl_LaunchIDNV.x", "lane")
+RAY = [("gl_IncomingRayFlagsNV", "flags"), ("uint(gl_RayTminNV * 64.0)", "tmin"),
+       ("floatBitsToUint(gl_WorldRayOriginNV.z)", "origin")]
+HIT = RAY + [("uint(gl_RayTmaxNV * 64.0)", "t"), ("uint(gl_InstanceCustomIndexNV)", "custom"), ("uint(gl_PrimitiveID)", "zero"),
+             ("uint(gl_InstanceID)", "instance")]
+BUILTINS = {"rgen": [LAUNCH], "rcall": [LAUNCH, ("gl_LaunchSizeNV.x", "lanes")],
+            "rmiss": [LAUNCH, ("uint(gl_RayTmaxNV * 64.0)", "t")] + RAY,
+            "rchit": [LAUNCH, ("gl_HitKindNV", "kind"), ("uint(gl_HitTNV * 64.0)", "t")] + HIT,
+            "rahit": [LAUNCH, ("gl_HitKindNV", "kind"), ("uint(gl_HitTNV * 64.0)", "t")] + HIT,
+            "rint": [LAUNCH] + HIT}
 
 
 class Stage:
     """Builds one shader. Every emitting method returns (lines, run) where run(f) executes on a frame."""
 
-    def __init__(self, rng, program, kind, name):
+    def __init__(self, rng, program, kind, name, values=None):
         self.rng, self.program, self.kind, self.name = rng, program, kind, name
-        self.types = [rng.choice(TYPES) for _ in range(rng.randint(3, 40 if rng.random() < 0.4 else 8))]
-        self.payloads = rng.randint(1, 2) if kind in ("rgen", "rchit", "rmiss") else 0
-        self.functions, self.loop_id = [], 0
+        self.types = [rng.choice(TYPES) for _ in range(values or rng.randint(2, 9))]
+        self.traces = kind in ("rgen", "rchit", "rmiss") and (values or rng.random() < 0.7)
+        self.payloads = rng.randint(1, 2) if self.traces else 0
+        self.record = kind != "rgen" and rng.random() < 0.4
+        self.local = rng.random() < 0.5  # variables of main instead of the module: no helper functions then
+        self.functions, self.loop_id, self.sites = [], 0, 0
         self.budget = rng.randint(2, 5) * program.size  # statements
 
     # -- expressions: (text, eval(frame)) of a uint
@@ -107,9 +89,16 @@ class Stage:
         if pick < 0.6:
             i = rng.randrange(len(self.types))
             t = self.types[i]
-            return t.load[0](f"v{i}"), lambda f: t.load[1](f["v"][i])
-        if pick < 0.68:
+            return t.load(f"v{i}"), lambda f: t.value(f["v"][i])
+        if pick < 0.66:
             return "x", lambda f: f["x"]
+        if pick < 0.72:
+            if self.record and rng.random() < 0.4:
+                return "rec.k", lambda f: f["b"]["record"]
+            if self.kind in ("rchit", "rahit") and rng.random() < 0.3:
+                return "uint(at.x * 4.0 + at.y * 256.0 + 0.5)", lambda f: f["b"]["at"]
+            text, key = rng.choice(BUILTINS[self.kind])
+            return text, lambda f: f["b"][key]
         op = rng.choice("+*^&|-")
         (a, ea), (b, eb) = self.expression(depth + 1), self.expression(depth + 1)
         calc = {"+": lambda p, q: p + q, "*": lambda p, q: p * q, "^": lambda p, q: p ^ q, "&": lambda p, q: p & q,
@@ -133,39 +122,74 @@ class Stage:
 
         def run(f):
             n = ev(f)
-            f["v"][i] = t.store[1](f["v"][i], n)
+            f["v"][i] = t.change(f["v"][i], n)
         # The expression is evaluated once: a store may read the variable several times.
-        return ["{ uint e = " + e + "; " + t.store[0](f"v{i}", "e") + " }"], run
+        return ["{ uint e = " + e + "; " + t.store(f"v{i}", "e") + " }"], run
 
     def trace(self):
-        rng = self.rng
-        program = self.program
+        rng, program = self.rng, self.program
+        self.sites += 1
         own = self.kind in ("rchit", "rmiss") and rng.random() < 0.2  # with the incoming payload
         loc = rng.randrange(self.payloads)
         variable = "p" if own else f"q{loc}"
         value, ev = self.expression()
         offset, eo = self.expression(1)
+        keep, ek = self.expression(1)  # a value alive across the trace that no variable holds
         hits, misses = len(program.hits), len(program.misses)
+        flags = rng.choice([0, 0, 0, 1, 2, 4, 5, 8, 12, 16, 64, 128])
+        tmin, tmax = rng.choice([0, 0, 0.5]), rng.choice([100.0625, 100.0625, 50.0625, 3.0])
         i = rng.randrange(len(self.types))
         t = self.types[i]
-        text = [f"{variable}.x = {value};", f"{variable}.d = depth + 1u;",
-                f"traceNV(scene, {rng.choice(['0', '0', '1', '16', '2'])}, ({variable}.x & 2u) != 0u ? 0xffu : 0u, ({offset}) % {hits}u, 0, "
-                f"({offset}) % {misses}u, {suite.RAY}, {0 if own else loc + 1});",
-                "{ uint e = " + variable + ".x; " + t.store[0](f"v{i}", "e") + " }"]
-        flags = int(text[2].split(", ")[1])
-        guard = self.kind != "rgen"
+        max_depth, guard = program.max_depth, self.kind != "rgen"
+        text = ["{", f"    uint keep = {keep};", f"    {variable}.x = {value};", f"    {variable}.d = depth + 1u;",
+                f"    traceNV(scene, {flags}, ({variable}.x >> 2) % {program.targets}u, ({offset}) % {hits}u, 0, ({offset}) % {misses}u, "
+                f"vec3(1.0, 1.0, -3.0), {tmin}, vec3(0.0, 0.0, 1.0), {tmax}, {0 if own else loc + 1});",
+                f"    uint e = {variable}.x ^ keep * 3u;", "    " + t.store(f"v{i}", "e"), "}"]
 
         def run(f):
-            if guard and f["depth"] >= MAX_DEPTH - 1:
+            if guard and f["depth"] >= max_depth - 1:
                 return
+            k = ek(f)
             payload = f["p"] if own else f["q"][loc]
             payload["x"], payload["d"] = ev(f), f["depth"] + 1
             o = eo(f)
-            program.trace(payload, f["depth"] + 1, (payload["x"] & 2) != 0, o % hits, o % misses, flags)
-            f["v"][i] = t.store[1](f["v"][i], payload["x"])
+            program.trace(payload, (payload["x"] >> 2) % program.targets, o % hits, o % misses, flags, tmin, tmax)
+            f["v"][i] = t.change(f["v"][i], payload["x"] ^ k * 3 & M)
         if guard:
-            return [f"if (depth < {MAX_DEPTH - 1}u) {{"] + ["    " + line for line in text] + ["}"], run
+            return [f"if (depth < {max_depth - 1}u) {{"] + ["    " + line for line in text] + ["}"], run
         return text, run
+
+    def report(self):
+        """A distance that no other report of this invocation has; attributes and kind with it."""
+        value, ev = self.expression()
+        i = self.rng.randrange(len(self.types))
+        t = self.types[i]
+        program = self.program
+
+        def run(f):
+            e, s = ev(f), f["s"]
+            s["reports"] += 1
+            if s["reports"] > MAX_REPORTS:
+                raise TooLong()
+            s["at"] = (e & 7) * 4 + s["reports"] * 256
+            kind = e >> 3 & 63
+            ok = program.report(f, ((e >> 9 & 15) * 64 + s["reports"]) / 8, kind, s["at"])
+            f["v"][i] = t.change(f["v"][i], 21 + kind if ok else 5)
+        return ["{ uint e = " + value + "; ++reports; at = vec2(float(e & 7u), float(reports)); uint k = (e >> 3) & 63u;",
+                "    e = reportIntersectionNV(float(((e >> 9) & 15u) * 64u + reports) * 0.125, k) ? 21u + k : 5u;",
+                "    " + t.store(f"v{i}", "e") + " }"], run
+
+    def leave(self):
+        """An end of an any-hit shader, after a payload write that stays."""
+        value, ev = self.expression()
+        c, ec = self.condition()
+        word, end = self.rng.choice([("ignoreIntersection", Ignore), ("terminateRay", Terminate)])
+
+        def run(f):
+            f["p"]["x"] = ev(f)
+            if ec(f):
+                raise end()
+        return [f"p.x = {value};", f"if ({c}) {word}NV();"], run
 
     def call(self):
         program = self.program
@@ -181,9 +205,9 @@ class Stage:
         def run(f):
             f["c"]["x"] = ev(f)
             program.call(target, f["c"])
-            f["v"][i] = t.store[1](f["v"][i], f["c"]["x"])
+            f["v"][i] = t.change(f["v"][i], f["c"]["x"])
         return [f"c.x = {value};", f"executeCallableNV({target}u, 7);",
-                "{ uint e = c.x; " + t.store[0](f"v{i}", "e") + " }"], run
+                "{ uint e = c.x; " + t.store(f"v{i}", "e") + " }"], run
 
     def block(self, depth, loop):
         parts = [self.statement(depth, loop) for _ in range(self.rng.randint(1, 2 + (self.program.size > 1)))]
@@ -222,14 +246,16 @@ class Stage:
             return self.loop(depth)
         if pick < 0.92:
             return self.switch(depth, loop)
-        return self.function(depth)
+        return self.function(depth) if not self.local else self.leaf()
 
     def leaf(self):
-        if self.kind in ("rgen", "rchit", "rmiss") and self.rng.random() < 0.65:
+        if self.traces and self.rng.random() < 0.65:
             return self.trace()
-        if self.kind != "rahit" and self.program.callables:
-            return self.call()
-        return self.assign()
+        if self.kind == "rahit":
+            return self.leave() if self.rng.random() < 0.5 else self.assign()
+        if self.kind == "rint":
+            return self.report()
+        return self.call() if self.program.callables else self.assign()
 
     def loop(self, depth):
         self.loop_id += 1
@@ -237,13 +263,18 @@ class Stage:
         n = self.rng.randint(1, 3)
         lines, body = self.block(depth + 1, True)
         extra, ee = self.condition()
-        form = self.rng.choice(["for", "while", "do"])
+        form = self.rng.choice(["for", "while", "do"] + ([] if self.local else ["step"]))
         inner = ["    " + l for l in lines]
+
+        if form == "step":  # the continue construct holds a call, a trace or a report
+            more, step = self.leaf()
+            self.functions.append([f"void step{name[1:]}(inout uint i, uint x) {{", "    ++i;"] +
+                                  ["    " + l for l in more] + ["}"])
 
         def run(f):
             i = 0
             while True:
-                if form != "do" and not (i < n and (form == "for" or ee(f))):
+                if form != "do" and not (i < n and (form != "while" or ee(f))):
                     return
                 if form == "while":
                     i += 1
@@ -255,10 +286,14 @@ class Stage:
                     return
                 except Continue:
                     pass
-                if form == "for":
+                if form in ("for", "step"):
                     i += 1
+                if form == "step":
+                    step(f)
                 if form == "do" and not (i < n and ee(f)):
                     return
+        if form == "step":
+            return [f"for (uint {name} = 0u; {name} < {n}u; step{name[1:]}({name}, x)) {{"] + inner + ["}"], run
         if form == "for":
             return [f"for (uint {name} = 0u; {name} < {n}u; ++{name}) {{"] + inner + ["}"], run
         if form == "while":
@@ -295,7 +330,8 @@ class Stage:
 
     def function(self, depth):
         """A helper with a parameter and its own early return; the stage's variables are module-scope then."""
-        name = f"f{len(self.functions)}"
+        slot = len(self.functions)
+        name = f"f{slot}"
         self.functions.append(None)
         saved, self.budget = self.budget, self.rng.randint(1, 4)
         lines, body = self.block(max(depth, 2), False)
@@ -306,7 +342,7 @@ class Stage:
         r2, e2 = self.expression()
         text = [f"uint {name}(uint x) {{"] + ["    " + l for l in lines] + [f"    if ({c}) return {r1};"] + \
             ["    " + l for l in after] + [f"    return {r2};", "}"]
-        self.functions[int(name[1:])] = text
+        self.functions[slot] = text
         i = self.rng.randrange(len(self.types))
         t = self.types[i]
         argument, ea = self.expression()
@@ -320,120 +356,201 @@ class Stage:
             else:
                 body2(inner)
                 value = e2(inner)
-            f["v"][i] = t.store[1](f["v"][i], value)
-        return ["{ uint e = " + f"{name}({argument}); " + t.store[0](f"v{i}", "e") + " }"], run
+            f["v"][i] = t.change(f["v"][i], value)
+        return ["{ uint e = " + f"{name}({argument}); " + t.store(f"v{i}", "e") + " }"], run
 
     def build(self):
         lines, self.body = self.block(0, False)
-        while self.budget > 0:
-            more, run = self.statement()
+        rich = self.traces and len(self.types) >= 30
+        while self.budget > 0 or (rich and not self.sites):
+            more, run = self.trace() if rich and not self.sites and self.budget < 1 else self.statement()
             lines += more
             self.body = (lambda a, b: lambda f: (a(f), b(f)))(self.body, run)
-        result = [f"{t.load[0](f'v{i}')}" for i, t in enumerate(self.types)]
-        text = HEAD
-        if self.kind in ("rchit", "rmiss", "rahit"):
-            text += f"struct P {{ uint x; uint d; {self.program.extra} }};\nlayout(location = 0) rayPayloadInNV P p;\n"
-        if self.kind == "rgen":
-            text += f"struct P {{ uint x; uint d; {self.program.extra} }};\n"
-        for i in range(self.payloads):
-            text += f"layout(location = {i + 1}) rayPayloadNV P q{i};\n"
+        kind, text = self.kind, HEAD
+        payload = f"struct P {{ uint x; uint d; {self.program.extra} }};\n"
+        if kind in ("rchit", "rmiss", "rahit"):
+            text += payload + "layout(location = 0) rayPayloadInNV P p;\n"
+        elif kind == "rgen":
+            text += payload
+        text += "".join(f"layout(location = {i + 1}) rayPayloadNV P q{i};\n" for i in range(self.payloads))
         text += "struct C { uint x; uint y; };\n"
-        if self.kind == "rcall":
+        if kind == "rcall":
             text += "layout(location = 0) callableDataInNV C in_;\n"
-        if self.kind != "rahit":
+        if kind not in ("rahit", "rint"):
             text += "layout(location = 7) callableDataNV C c;\n"
-        text += "uint depth;\n" + "".join(f"{t.name} v{i}{t.array};\n" for i, t in enumerate(self.types))
+        if kind in ("rchit", "rahit", "rint"):
+            text += "hitAttributeNV vec2 at;\n"
+        if self.record:
+            text += "layout(shaderRecordNV) buffer Rec { uint k; } rec;\n"
+        variables = [f"{t.name} v{i}{t.array}" for i, t in enumerate(self.types)]
+        text += "uint depth, reports;\n"
+        if not self.local:
+            text += "".join(v + ";\n" for v in variables)
         # Prototypes first, for helpers call helpers.
         text += "".join(f[0].replace(" {", ";") + "\n" for f in self.functions)
         text += "".join("\n".join(f) + "\n" for f in self.functions)
         text += "void main() {\n"
-        source = {"rgen": "gl_LaunchIDNV.x * 0x9e3779b9u + 1u", "rcall": "in_.x"}.get(self.kind, "p.x")
-        text += f"    uint x = {source};\n    depth = {'p.d' if self.kind in ('rchit', 'rmiss', 'rahit') else '0u'};\n"
+        source = {"rgen": "gl_LaunchIDNV.x * 0x9e3779b9u + 1u", "rcall": "in_.x",
+                  "rint": "gl_LaunchIDNV.x * 0x85ebca6bu + 7u"}.get(kind, "p.x")
+        text += f"    uint x = {source};\n    reports = 0u;\n"
+        text += f"    depth = {'p.d' if kind in ('rchit', 'rmiss', 'rahit') else '0u'};\n"
         for i, t in enumerate(self.types):
-            if t.array:
-                text += f"    for (int k = 0; k < 4; ++k) v{i}[k] = 0u;\n"
-            else:
-                text += f"    v{i} = {ZERO[t.name]};\n"
-        if self.kind != "rahit":
+            text += f"    {variables[i] if self.local else f'v{i}'} = {t.zero};\n"
+        if kind not in ("rahit", "rint"):
             text += "    c.x = 0u; c.y = 0u;\n"
-        for i in range(self.payloads):
-            text += f"    q{i}.x = 0u; q{i}.d = 0u;\n"
+        if kind == "rint":
+            text += "    at = vec2(0.0);\n"
+        text += "".join(f"    q{i}.x = 0u; q{i}.d = 0u;\n" for i in range(self.payloads))
         text += "".join("    " + l + "\n" for l in lines)
-        text += "    uint h = x;\n" + "".join(f"    h = h * 31u + {w};\n" for w in result)
-        for i in range(self.payloads):
-            text += f"    h = h * 31u + q{i}.x;\n"
-        if self.kind == "rgen":
-            text += "    r[gl_LaunchIDNV.x] = h;\n"
-        elif self.kind == "rcall":
-            text += "    in_.x = h;\n"
-        elif self.kind == "rahit":
-            text += "    p.x = h;\n    if ((h & 12u) == 4u) ignoreIntersectionNV();\n    p.x = h + 1u;\n"
-        else:
-            text += "    p.x = h;\n"
+        text += "    uint h = x;\n" + "".join(f"    h = h * 31u + {t.load(f'v{i}')};\n" for i, t in enumerate(self.types))
+        text += "".join(f"    h = h * 31u + q{i}.x;\n" for i in range(self.payloads))
+        text += {"rgen": "    r[gl_LaunchIDNV.x] = h;\n", "rcall": "    in_.x = h;\n",
+                 "rahit": "    p.x = h;\n    if ((h & 12u) == 4u) ignoreIntersectionNV();\n    p.x = h + 1u;\n",
+                 "rint": "    at = vec2(6.0, 0.0);\n    ++reports;\n"
+                         "    reportIntersectionNV(float((h & 15u) * 64u + reports) * 0.125, (h >> 4) & 63u);\n",
+                 }.get(kind, "    p.x = h;\n")
         self.source = text + "}\n"
 
-    def run(self, x, depth, payload=None):
+    def run(self, x, depth, builtins, payload=None, search=None):
         program = self.program
         program.calls += 1
         if program.calls > MAX_CALLS:
             raise TooLong()
-        f = {"x": x, "depth": depth, "v": [list(t.default) if isinstance(t.default, list) else t.default for t in self.types],
-             "p": payload, "q": [{"x": 0, "d": 0} for _ in range(self.payloads)], "c": {"x": 0}}
+        f = {"x": x, "depth": depth, "v": [t.default for t in self.types], "p": payload, "c": {"x": 0},
+             "q": [{"x": 0, "d": 0} for _ in range(self.payloads)], "b": builtins, "search": search,
+             "s": {"reports": 0, "at": 0}}
         self.body(f)
         h = x
         for i, t in enumerate(self.types):
-            h = (h * 31 + t.load[1](f["v"][i])) & M
+            h = (h * 31 + t.value(f["v"][i])) & M
         for q in f["q"]:
             h = (h * 31 + q["x"]) & M
+        if self.kind == "rint":
+            program.report(f, ((h & 15) * 64 + f["s"]["reports"] + 1) / 8, h >> 4 & 63, 24)
         return h
 
 
 class Program:
-    def __init__(self, seed, size):
+    def __init__(self, seed, size, rich):
         self.size = size
         self.rng = rng = random.Random(seed)
         self.extra = rng.choice(["", "bool unused;", "float unused[3];", "mat2 unused; bool also;"])
+        self.max_depth = rng.choice([2, 3, 3, 4])
         self.callables, self.calls = [], 0
-        self.rgen = Stage(rng, self, "rgen", "rgen")
-        self.callables = [Stage(rng, self, "rcall", f"call{i}") for i in range(rng.choice([0, 1, 2, 3]))]
-        self.hits = [Stage(rng, self, "rchit", f"hit{i}") for i in range(rng.randint(1, 3))]
-        self.misses = [Stage(rng, self, "rmiss", f"miss{i}") for i in range(rng.randint(1, 2))]
+        many = rng.randint(30, 36) if rich else None
+        in_hit = rng.random() < 0.5  # which stage holds the 30 values
+        self.rgen = Stage(rng, self, "rgen", "rgen", many if not in_hit else rng.randint(2, 9))
+        self.callables = [Stage(rng, self, "rcall", f"call{i}") for i in range(rng.choice([0, 0, 1, 2]))]
+        self.hits = [Stage(rng, self, "rchit", f"hit{i}", (many if in_hit else rng.randint(2, 9)) if rich and i == 0 else None)
+                     for i in range(rng.randint(1, 2))]
+        self.misses = [Stage(rng, self, "rmiss", f"miss{i}") for i in range(rng.choice([1, 1, 2]))]
         self.any = Stage(rng, self, "rahit", "any") if rng.random() < 0.4 else None
+        self.int = Stage(rng, self, "rint", "box") if rng.random() < 0.4 else None
+        self.targets = 3 if self.int else 2  # mask 0: nothing, 1: the triangle, 2: the box
         for stage in self.stages():
             stage.build()
 
     def stages(self):
-        return [self.rgen] + self.misses + self.hits + ([self.any] if self.any else []) + self.callables
+        return [self.rgen] + self.misses + self.hits + [s for s in (self.any, self.int) if s] + self.callables
 
-    def trace(self, payload, depth, hit, hit_index, miss_index, flags):
-        # The triangle shows its back: flag 16 culls it. Any-hit runs unless the ray forces opacity.
-        if hit and not flags & 16:
-            if self.any and not flags & 1:
-                h = self.any.run(payload["x"], payload["d"], payload)
-                payload["x"] = h
-                if (h & 12) == 4:
-                    hit = False
-                else:
-                    payload["x"] = (h + 1) & M
+    def is_rich(self):
+        tracing = [s for s in self.stages() if s.sites]
+        return len(tracing) >= 2 and max(len(s.types) for s in tracing) >= 30
+
+    def judge(self, payload, builtins):
+        """The any-hit shader's verdict: (accepted, ends the search)."""
+        try:
+            payload["x"] = h = self.any.run(payload["x"], payload["d"], builtins, payload)
+        except Ignore:
+            return False, False
+        except Terminate:
+            return True, True
+        if (h & 12) == 4:
+            return False, False
+        payload["x"] = (h + 1) & M
+        return True, False
+
+    def report(self, f, t, kind, at):
+        search = f["search"]
+        builtins, flags = f["b"], search["flags"]
+        if not search["tmin"] <= t <= search["t"]:
+            return False
+        ends = False
+        if self.any and not flags & 1:
+            accepted, ends = self.judge(search["payload"], dict(builtins, kind=kind, t=int(t * 64), at=at))
+            if not accepted:
+                return False
+        search.update(t=t, kind=kind, at=at, hit=True)
+        builtins["t"] = int(t * 64)  # gl_RayTmax of the intersection shader from now on
+        if ends or flags & 4:
+            raise EndSearch()
+        return True
+
+    def trace(self, payload, target, hit_index, miss_index, flags, tmin, tmax):
+        ray = {"lane": self.lane, "lanes": LANES, "flags": flags, "tmin": int(tmin * 64), "origin": 0xC0400000,
+               "zero": 0, "t": int(tmax * 64)}
+        search = {"t": tmax, "tmin": tmin, "hit": False, "flags": flags, "payload": payload}
+        record = hit_index
+        if target == 1 and not flags & (16 | 128) and tmax > 4:  # the triangle shows its back
+            ray.update(custom=11, instance=0)
+            hit = dict(ray, kind=0xFF, t=256, at=1 + 64, record=1000 + record)
+            if not (self.any and not flags & 1) or self.judge(payload, hit)[0]:
+                search.update(hit=True)
+        elif target == 2 and not flags & 128 and tmax > 4:
+            record += len(self.hits)
+            ray.update(custom=22, instance=1)
+            inside = dict(ray, record=1000 + record)
+            try:
+                self.int.run((self.lane * 0x85EBCA6B + 7) & M, 0, inside, None, search)
+            except EndSearch:
+                pass
+            hit = dict(ray, kind=search.get("kind"), t=int(search["t"] * 64), at=search.get("at"), record=1000 + record)
+        if search["hit"]:
+            if not flags & 8:
+                payload["x"] = self.hits[hit_index].run(payload["x"], payload["d"], hit, payload)
         else:
-            hit = False
-        stage = self.hits[hit_index] if hit else self.misses[miss_index]
-        payload["x"] = stage.run(payload["x"], payload["d"], payload)
+            payload["x"] = self.misses[miss_index].run(
+                payload["x"], payload["d"], dict(ray, t=int(tmax * 64), record=2000 + miss_index), payload)
 
     def call(self, target, data):
-        data["x"] = self.callables[target].run(data["x"], 0)
+        data["x"] = self.callables[target].run(data["x"], 0, {"lane": self.lane, "lanes": LANES, "record": 3000 + target})
 
     def case(self, name):
         expected = []
-        for lane in range(LANES):
+        for self.lane in range(LANES):
             self.calls = 0
-            expected.append(self.rgen.run((lane * 0x9E3779B9 + 1) & M, 0))
+            expected.append(self.rgen.run((self.lane * 0x9E3779B9 + 1) & M, 0, {"lane": self.lane}))
         stages = [{"stage": s.kind, "name": s.name, "source": s.source.split("\n")} for s in self.stages()]
-        groups = [{"name": h.name, "closest": h.name, **({"any": "any"} if self.any else {})} for h in self.hits]
-        return {"name": name, "stages": stages, "groups": groups, "size": [LANES, 1, 1], "recursion": MAX_DEPTH,
-                "callable-depth": len(self.callables),
-                "scene": {"meshes": [{"name": "t", "triangles": [suite.triangle(1)], "geometry-flags": ["no-duplicate-any-hit"]}]},
+        any = {"any": "any"} if self.any else {}
+        groups = [{"name": h.name, "closest": h.name, **any} for h in self.hits]
+        once = {"geometry-flags": ["no-duplicate-any-hit"]}
+        meshes = [{"name": "t", "triangles": [suite.triangle(1)], **once}]
+        instances = [{"mesh": "t", "mask": 1, "custom": 11}]
+        if self.int:
+            groups += [{"name": "box-" + h.name, "closest": h.name, "intersection": "box", **any} for h in self.hits]
+            meshes.append({"name": "b", "boxes": [suite.box(0, 0, 1, 3)], **once})
+            instances.append({"mesh": "b", "mask": 2, "custom": 22, "offset": len(self.hits)})
+        table = {"hit": [{"group": g["name"], "data": {"u32": [1000 + i]}} for i, g in enumerate(groups)],
+                 "miss": [{"group": m.name, "data": {"u32": [2000 + i]}} for i, m in enumerate(self.misses)],
+                 "callable": [{"group": c.name, "data": {"u32": [3000 + i]}} for i, c in enumerate(self.callables)]}
+        return {"name": name, "stages": stages, "groups": groups, "table": table, "size": [LANES, 1, 1],
+                "recursion": self.max_depth, "callable-depth": max(1, len(self.callables)),
+                "scene": {"meshes": meshes, "instances": instances},
                 "bindings": {"0.1": {"size": 64}}, "expect": [{"cell": name, "at": 0, "values": expected}]}
+
+
+def draw(seed, size):
+    """The program of a seed: programs that run too long, or miss being rich, are drawn again. None: none found."""
+    rich = seed % 3 != 0
+    for attempt in range(200):
+        try:
+            program = Program(seed * 1000 + attempt, size, rich)
+            case = program.case(f"random/{seed}")
+        except TooLong:
+            continue
+        if program.is_rich() or not rich:
+            return program, case
+    return None, None
 
 
 def main():
@@ -441,21 +558,17 @@ def main():
     size = int(sys.argv[4]) if len(sys.argv) > 4 else 1
     os.makedirs(os.path.join(folder, "random"), exist_ok=True)
     sys.setrecursionlimit(10000)
-    written = 0
+    written = rich = 0
     for seed in range(first, first + count):
-        for attempt in range(200):  # too long: the same seed draws again
-            try:
-                case = Program(seed * 1000 + attempt, size).case(f"random/{seed}")
-                break
-            except TooLong:
-                continue
-        else:
+        program, case = draw(seed, size)
+        if not case:
             continue
+        rich += program.is_rich()
         with open(os.path.join(folder, "random", f"{seed}.json"), "w") as out:
-            json.dump(case, out, indent=1)
+            json.dump(case, out, separators=(",", ":"))
             out.write("\n")
         written += 1
-    print(f"{written} random pipelines in {folder}")
+    print(f"{written} random pipelines in {folder}; in {rich} two or more stages trace and 30 or more values are alive")
 
 
 if __name__ == "__main__":

@@ -45,6 +45,8 @@ struct SuiteOptions {
     RtcOptions rtc;
     bool list = false, verbose = false, compare = false;  // compare: with native KHR, whole outputs
     unsigned timeout_seconds = 120;                       // for one case
+    double limit_seconds = 0;                             // for all; cases behind it are skipped. 0: none
+    size_t shard = 0, shards = 1;                         // only every shards-th case, from `shard` on
     std::string save_oracle, oracle;                      // folders of outputs of the native run
 };
 // Exit status: 0 all passed.

@@ -15,6 +15,8 @@ struct CommandLine {
     std::vector<std::string> stages, hit_groups, binds, specs, outputs, defines, include_dirs, variants;
     std::string scene, size, native_kind, device, case_file, push, table, suite, filter, json, save, oracle,
         save_oracle;
+    double limit = 0;
+    std::string shard;
     bool compare = false, validate = false, list = false, verbose = false, optimize = false, print = false;
     uint32_t recursion = 0, callable_depth = 0, repeats = 1, budget = 0, rounds = 0, timeout = 120;
     int resumable = -1, fetch = -1;
@@ -203,6 +205,14 @@ int run(const CommandLine& c) {
         suite.verbose = c.verbose;
         suite.compare = c.compare;
         suite.timeout_seconds = c.timeout;
+        suite.limit_seconds = c.limit;
+        if (!c.shard.empty()) {
+            unsigned index = 0, count = 0;
+            if (std::sscanf(c.shard.c_str(), "%u/%u", &index, &count) != 2 || !count || index >= count)
+                throw Error("--shard '" + c.shard + "': INDEX/COUNT was expected, INDEX below COUNT");
+            suite.shard = index;
+            suite.shards = count;
+        }
         suite.oracle = c.oracle;
         suite.save_oracle = c.save_oracle;
         return run_suite(suite);
@@ -305,6 +315,8 @@ int main(int argc, char** argv) {
     app.add_option("--on", c.variants, "variants of the suite: rtc-nv rtc-ext khr nv")->delimiter(',');
     app.add_option("--json", c.json, "write the suite's results there");
     app.add_option("--timeout", c.timeout, "seconds for one case of the suite (120)");
+    app.add_option("--limit", c.limit, "seconds for the whole suite; cases that are left then are skipped");
+    app.add_option("--shard", c.shard, "I/N: of the suite, every Nth case from the Ith on");
     app.add_option("--oracle", c.oracle, "folder of recorded native outputs for cases without values");
     app.add_option("--save-oracle", c.save_oracle, "record native outputs there");
     app.add_flag("--list", c.list, "list the suite's cases");

@@ -180,6 +180,13 @@ Json to_json(size_t index, const Outcome& outcome) {
             {"seconds", outcome.seconds}};
 }
 
+// A driver that lost its device answers nothing any more in this process.
+bool lost_device(const Outcome& outcome) {
+    return outcome.kind == Outcome::Kind::Failed && outcome.detail.find("DEVICE_LOST") != std::string::npos;
+}
+
+constexpr int kLost = 4;  // the child's exit status then
+
 // The child's work: tasks from `first` on, one line of JSON each.
 [[noreturn]] void child(const std::vector<Task>& tasks, size_t first, const SuiteOptions& options, int out) {
     std::map<Backend, std::unique_ptr<Host>> hosts;
@@ -197,14 +204,14 @@ Json to_json(size_t index, const Outcome& outcome) {
     for (size_t i = first; i < tasks.size(); ++i) {
         std::string line = "{\"start\": " + std::to_string(i) + "}\n";
         if (write(out, line.data(), line.size()) < 0) _exit(3);
-        line = to_json(i, run_one(tasks[i], options, host_of))
-                   .dump(-1, ' ', false, Json::error_handler_t::replace) +
-               "\n";
+        const Outcome outcome = run_one(tasks[i], options, host_of);
+        line = to_json(i, outcome).dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
         for (size_t at = 0; at < line.size();) {
             ssize_t wrote = write(out, line.data() + at, line.size() - at);
             if (wrote <= 0) _exit(3);
             at += size_t(wrote);
         }
+        if (lost_device(outcome)) _exit(kLost);
     }
     hosts.clear();
     _exit(0);
@@ -216,6 +223,12 @@ int run_suite(const SuiteOptions& options) {
     std::vector<Task> tasks;
     for (const std::string& file : find_cases(options.folder, options.filter))
         for (const std::string& variant : options.variants) tasks.push_back({file, variant});
+    if (options.shards > 1) {  // neighbours, which cost alike, go to different shards
+        size_t kept = 0;
+        for (size_t i = options.shard; i < tasks.size(); i += options.shards) tasks[kept++] = tasks[i];
+        tasks.resize(kept);
+        if (tasks.empty()) return 0;
+    }
     if (tasks.empty()) throw Error("no case fits '" + options.filter + "' under " + options.folder);
     if (options.list) {
         for (const Task& task : tasks) std::printf("%s [%s]\n", task.file.c_str(), task.variant.c_str());
@@ -252,7 +265,15 @@ int run_suite(const SuiteOptions& options) {
     std::vector<Outcome> outcomes(tasks.size());
     std::vector<bool> done(tasks.size());
     size_t next = 0;
-    while (next < tasks.size()) {
+    const auto begin = std::chrono::steady_clock::now();
+    // Milliseconds until the whole suite must end; far away when no limit was given.
+    auto left = [&] {
+        if (!options.limit_seconds) return 1000000000.0;
+        return options.limit_seconds * 1e3 -
+               std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+    };
+    while (next < tasks.size() && left() > 0) {
+        const size_t first = next;
         int ends[2];
         if (pipe(ends)) throw Error("pipe failed");
         std::fflush(nullptr);
@@ -265,12 +286,13 @@ int run_suite(const SuiteOptions& options) {
         close(ends[1]);
         std::string text;
         size_t running = next;
-        bool timed_out = false;
+        bool timed_out = false, out_of_time = false;
         for (;;) {
             pollfd wait{ends[0], POLLIN, 0};
-            int ready = poll(&wait, 1, int(options.timeout_seconds * 1000));
+            const double patience = options.timeout_seconds * 1e3;
+            int ready = poll(&wait, 1, int(std::max(0.0, std::min(patience, left()))));
             if (ready == 0) {
-                timed_out = true;
+                (left() <= 0 ? out_of_time : timed_out) = true;
                 kill(pid, SIGKILL);
                 break;
             }
@@ -296,6 +318,7 @@ int run_suite(const SuiteOptions& options) {
                                              cell["known"].get<std::string>()});
                 done[index] = true;
                 running = index + 1;
+                if (lost_device(outcome) && index != first) continue;  // judged again below
                 if (outcome.kind == Outcome::Kind::Failed || options.verbose)
                     std::printf("%s %s [%s] %.2f s%s%s\n",
                                 outcome.kind == Outcome::Kind::Failed    ? "FAIL"
@@ -311,7 +334,19 @@ int run_suite(const SuiteOptions& options) {
         close(ends[0]);
         int status = 0;
         waitpid(pid, &status, 0);
-        if (running >= tasks.size()) break;
+        if (WIFEXITED(status) && WEXITSTATUS(status) == kLost && running > next) {
+            // The case that lost the device, or one before it: it runs again, first in a new process. What
+            // loses the device there has lost it itself.
+            next = running - 1 == first ? running : running - 1;
+            if (next < running) {
+                done[next] = false;
+                std::printf("lost the device by %s [%s] or a case before; again\n",
+                            std::filesystem::relative(tasks[next].file, options.folder).c_str(),
+                            tasks[next].variant.c_str());
+            }
+            continue;
+        }
+        if (running >= tasks.size() || out_of_time) break;
         // It died in `running`. A native driver that cannot finish (lavapipe 25 takes minutes to compile some
         // loops around traces) says nothing about rtc: that is a skip with its reason.
         Outcome& outcome = outcomes[running];
@@ -325,7 +360,14 @@ int run_suite(const SuiteOptions& options) {
         std::printf("%s %s [%s]\n     %s\n", outcome.kind == Outcome::Kind::Failed ? "FAIL" : "skip",
                     std::filesystem::relative(tasks[running].file, options.folder).c_str(),
                     tasks[running].variant.c_str(), outcome.detail.c_str());
+        done[running] = true;
         next = running + 1;
+    }
+    for (size_t i = 0; i < tasks.size(); ++i) {
+        if (done[i]) continue;
+        outcomes[i] = {Outcome::Kind::Skipped, "out of time", {}, 0};
+        std::printf("skip %s [%s]\n     out of time\n",
+                    std::filesystem::relative(tasks[i].file, options.folder).c_str(), tasks[i].variant.c_str());
     }
 
     struct Count {
