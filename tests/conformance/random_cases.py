@@ -77,7 +77,7 @@ class Stage:
         self.record = kind != "rgen" and rng.random() < 0.4
         self.local = rng.random() < 0.5  # variables of main instead of the module: no helper functions then
         self.functions, self.loop_id, self.sites = [], 0, 0
-        self.budget = rng.randint(2, 5) * program.size  # statements
+        self.budget = rng.randint(2, 5) * program.size if program.size else rng.randint(0, 2)  # statements
 
     # -- expressions: (text, eval(frame)) of a uint
     def expression(self, depth=0):
