@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Random well-defined pipelines with their expected output.
 
-  random_cases.py FOLDER FIRST_SEED COUNT [SIZE]      SIZE 1 (default) to 3: statements a shader
+  random_cases.py FOLDER FIRST_SEED COUNT [SIZE]      SIZE 1 (default) to 3: statements a shader; 0: small ones for CI
 
 Each seed becomes a case file: ray generation, closest-hit, miss, any-hit, intersection and callable shaders made
 of nested control flow, helper functions, traces, reports and callables at random places, live values of random
@@ -18,7 +18,7 @@ import sys
 sys.dont_write_bytecode = True
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import suite
-from random_types import EXTENSIONS, M, STRUCTS, TYPES
+from random_types import EXTENSIONS, M, SCALARS, STRUCTS, TYPES
 
 LANES = 8
 MAX_CALLS = 3000    # stage invocations of one lane; programs that need more are drawn again
@@ -71,7 +71,9 @@ class Stage:
 
     def __init__(self, rng, program, kind, name, values=None):
         self.rng, self.program, self.kind, self.name = rng, program, kind, name
-        self.types = [rng.choice(TYPES) for _ in range(values or rng.randint(2, 9))]
+        count = values or rng.randint(2, 9) // (1 if program.size else 2)
+        # Small programs, for drivers that compile slowly: types of one word beyond the first few.
+        self.types = [rng.choice(TYPES if program.size or i < 6 else SCALARS) for i in range(count)]
         self.traces = kind in ("rgen", "rchit", "rmiss") and (values or rng.random() < 0.7)
         self.payloads = rng.randint(1, 2) if self.traces else 0
         self.record = kind != "rgen" and rng.random() < 0.4
@@ -440,10 +442,10 @@ class Program:
         many = rng.randint(30, 36) if rich else None
         in_hit = rng.random() < 0.5  # which stage holds the 30 values
         self.rgen = Stage(rng, self, "rgen", "rgen", many if not in_hit else rng.randint(2, 9))
-        self.callables = [Stage(rng, self, "rcall", f"call{i}") for i in range(rng.choice([0, 0, 1, 2]))]
+        self.callables = [Stage(rng, self, "rcall", f"call{i}") for i in range(rng.choice([0, 0, 1, 2] if size else [0, 0, 1]))]
         self.hits = [Stage(rng, self, "rchit", f"hit{i}", (many if in_hit else rng.randint(2, 9)) if rich and i == 0 else None)
-                     for i in range(rng.randint(1, 2))]
-        self.misses = [Stage(rng, self, "rmiss", f"miss{i}") for i in range(rng.choice([1, 1, 2]))]
+                     for i in range(rng.randint(1, 2) if size else 1)]
+        self.misses = [Stage(rng, self, "rmiss", f"miss{i}") for i in range(rng.choice([1, 1, 2]) if size else 1)]
         self.any = Stage(rng, self, "rahit", "any") if rng.random() < 0.4 else None
         self.int = Stage(rng, self, "rint", "box") if rng.random() < 0.4 else None
         self.targets = 3 if self.int else 2  # mask 0: nothing, 1: the triangle, 2: the box

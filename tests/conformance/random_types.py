@@ -103,6 +103,8 @@ TYPES = [
          lambda v: f"(uint({v}.a) + uint({v}.b) * 256u + uint({v}.c) * 512u + uint(float({v}.d)))",
          lambda x: (x[0] + x[1] * 256 + x[2] * 512 + x[3]) & M),
 ]
+SCALARS = [t for t in TYPES if not t.array and t.name in ("uint", "int", "bool", "float", "uint8_t", "uint16_t", "int16_t",
+                                                           "float16_t", "bvec2")]
 STRUCTS = ("struct S { uint a; bool b; float c; };\nstruct N { S s; uvec2 a[2]; };\n"
            "struct T { uint8_t a; bool b; uint16_t c; float16_t d; };\n")
 EXTENSIONS = [f"GL_EXT_shader_explicit_arithmetic_types_{t}" for t in ("int64", "int16", "int8", "float16")]
