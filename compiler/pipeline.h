@@ -72,7 +72,8 @@ struct LinkOptions {
     TargetEnv target = TargetEnv::Auto;
     Optimization optimize = Optimization::None;
     bool debug_info = false;            // -g: keep OpLine, OpName, OpSource
-    bool validate = true;               // run spirv-val on the result
+    bool validate = true;               // run spirv-val on the result (traversal apart, see link/partial.cpp)
+    bool trust_input = false;           // for measurements: the stages are valid, do not run spirv-val on them
     Addressing addressing = Addressing::Heap;
     bool resumable = true;              // lanes can suspend (see docs/resumable.md)
     uint32_t max_recursion_depth = 0;   // trace calls nested in trace calls, 1..31; 0: 1, or 31 when hit or miss shaders trace
@@ -154,7 +155,7 @@ struct LinkResult {
     std::string dump;  // module text when LinkOptions::stop_after was given
 };
 
-// The whole journey below the front end. Thread-safe; no global state.
+// The whole journey below the front end. Thread-safe; what is kept between calls is a cache of prepared traversals.
 LinkResult link_pipeline(const PipelineInput& input, const LinkOptions& options);
 
 // ---- reflect/ -----------------------------------------------------------------

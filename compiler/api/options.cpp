@@ -185,6 +185,14 @@ rtcc_status rtcc_options_set_addressing(rtcc_options_t options, rtcc_addressing 
     });
 }
 
+rtcc_status rtcc_options_set_compat(rtcc_options_t options, rtcc_compat compat) {
+    return set(options, [&](rtcc_options& o) {
+        if (compat != RTCC_COMPAT_NONE && compat != RTCC_COMPAT_GDC2019) return RTCC_STATUS_INVALID_ARGUMENT;
+        o.frontend.gdc2019 = compat == RTCC_COMPAT_GDC2019;
+        return RTCC_STATUS_SUCCESS;
+    });
+}
+
 rtcc_status rtcc_options_set_resumable(rtcc_options_t options, int enable) {
     return set(options, [&](rtcc_options& o) {
         o.link.resumable = enable != 0;

@@ -181,6 +181,7 @@ ir::Module prepare(const ir::Module& words, const std::map<uint32_t, bool>& choi
     auto is_gone = [&](const Inst& inst) { return !there.contains(inst.ops[0]); };
     std::erase_if(p.module.decorations, is_gone);
     std::erase_if(p.module.names, is_gone);
+    for (Function& function : functions) function.prepared = true;
     p.module.functions = std::move(functions);
     return std::move(p.module);
 }

@@ -43,6 +43,7 @@ struct FrontendOptions {
     IncludeCallback include;   // when empty: the file system
     std::string glsl_version;  // "460", "460core": overrides #version (-std=)
     bool debug_info = true;    // OpLine, OpSource with text
+    bool gdc2019 = false;      // accept spellings of 2019 (compat.h); included files are taken as they are
 };
 
 struct GlslSource {

@@ -6,6 +6,7 @@
 #include <mutex>
 
 #include "frontend/advice.h"
+#include "frontend/compat.h"
 #include "frontend/frontend.h"
 #include "frontend/includer.h"
 #include "frontend/messages.h"
@@ -329,7 +330,9 @@ std::string glslang_version() {
            std::to_string(version.patch);
 }
 
-FrontendResult compile_glsl(const GlslSource& source, const FrontendOptions& options) {
+FrontendResult compile_glsl(const GlslSource& original, const FrontendOptions& options) {
+    GlslSource source = original;
+    if (options.gdc2019) source.text = translate_gdc2019(source.text);
     const SourceFacts facts = scan_source(source.text);
     FrontendResult result;
     StageKind kind;
@@ -356,7 +359,9 @@ FrontendResult compile_glsl(const GlslSource& source, const FrontendOptions& opt
     return std::move(attempt.result);
 }
 
-FrontendResult preprocess_glsl(const GlslSource& source, const FrontendOptions& options) {
+FrontendResult preprocess_glsl(const GlslSource& original, const FrontendOptions& options) {
+    GlslSource source = original;
+    if (options.gdc2019) source.text = translate_gdc2019(source.text);
     const SourceFacts facts = scan_source(source.text);
     FrontendResult result;
     StageKind kind = StageKind::RayGen;

@@ -73,6 +73,7 @@ struct Function {
     Inst def;  // OpFunction
     std::vector<Inst> params;
     std::vector<Block> blocks;
+    bool prepared = false;  // part of traversal: cleaned up and validated when rtc was built
 
     Id id() const { return def.result; }
     Block* find_block(Id label);

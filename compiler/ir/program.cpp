@@ -218,6 +218,13 @@ void Program::decorate(Id target, spv::Decoration decoration, std::vector<uint32
     module.decorations.push_back(std::move(inst));
 }
 
+void Program::member_decorate(Id target, uint32_t member, spv::Decoration decoration, std::vector<uint32_t> operands) {
+    Inst inst(Op::OpMemberDecorate, 0, 0, {target, member, static_cast<uint32_t>(decoration)});
+    inst.ops.insert(inst.ops.end(), operands.begin(), operands.end());
+    decoration_index_[target].push_back(module.decorations.size());
+    module.decorations.push_back(std::move(inst));
+}
+
 std::vector<const Inst*> Program::decorations_of(Id id) const {
     std::vector<const Inst*> out;
     const auto found = decoration_index_.find(id);

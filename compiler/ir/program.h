@@ -67,6 +67,7 @@ class Program {
     Id add_global(Inst inst);  // gives inst.result a fresh id when it is 0
     Id add_variable(spv::StorageClass storage, Id pointee, const std::string& name);
     void decorate(Id target, spv::Decoration decoration, std::vector<uint32_t> operands = {});
+    void member_decorate(Id target, uint32_t member, spv::Decoration decoration, std::vector<uint32_t> operands = {});
     std::vector<const Inst*> decorations_of(Id id) const;
     bool decoration(Id id, spv::Decoration decoration, uint32_t* operand = nullptr) const;
     bool member_decoration(Id id, uint32_t member, spv::Decoration decoration, uint32_t* operand = nullptr) const;
@@ -83,6 +84,8 @@ class Program {
 
     // Types of lowered acceleration structures: the header block, and arrays of it by original array type.
     Id header_struct = 0;
+    // Push constants as words, when the stages' blocks differ; 0: they agree.
+    Id push_words = 0;
     std::map<Id, Id> header_arrays;
 
     // Rebuilds lookup tables after passes edited module.globals or module.decorations directly.

@@ -222,18 +222,23 @@ void declare_entry(Program& p, Id main, const LinkOptions& options, Reflection& 
     entry.model = spv::ExecutionModel::GLCompute;
     entry.function = main;
     entry.name = "main";
+    m.entry_points = {entry};
+    m.execution_modes.push_back(Inst(Op::OpExecutionMode, 0, 0,
+                                     {main, static_cast<uint32_t>(spv::ExecutionMode::LocalSize), 64, 1, 1}));
+}
+
+void declare_interface(ir::Module& m) {
+    std::vector<Id>& interface = m.entry_points.front().interface;
+    interface.clear();
     ir::IdSet used;
     for (const ir::Function& function : m.functions)
         for (const ir::Block& block : function.blocks)
             for (const Inst& inst : block.insts) inst.for_each_id([&](Id id) { used.insert(id); });
     for (const Inst& inst : m.globals) {
-        if (inst.op != Op::OpVariable || !used.count(inst.result)) continue;
+        if (inst.op != Op::OpVariable || !used.contains(inst.result)) continue;
         const auto storage = static_cast<spv::StorageClass>(inst.ops[0]);
-        if (version >= 0x00010400u || storage == spv::StorageClass::Input) entry.interface.push_back(inst.result);
+        if (m.version >= 0x00010400u || storage == spv::StorageClass::Input) interface.push_back(inst.result);
     }
-    m.entry_points = {entry};
-    m.execution_modes.push_back(Inst(Op::OpExecutionMode, 0, 0,
-                                     {main, static_cast<uint32_t>(spv::ExecutionMode::LocalSize), 64, 1, 1}));
 }
 
 std::vector<std::string> required_features(const ir::Module& module) {

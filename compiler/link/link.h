@@ -23,8 +23,10 @@ struct ResourceTable {
     std::map<std::pair<uint32_t, uint32_t>, std::pair<std::string, std::string>> kinds;  // (set, binding) -> kind, stage
     std::map<std::pair<uint32_t, uint32_t>, Id> first;  // the first variable at (set, binding)
     Id push_constants = 0;
-    std::string push_constants_stage;
 };
+// push_constants.cpp: looks at all stages' push-constant blocks before any is lowered. When they differ, makes
+// Program::push_words.
+void prepare_push_constants(Program& program, const std::vector<ir::Module>& modules, Reflection& reflection);
 void unify_resources(Program& program, lower::Stage& stage, ResourceTable& table, Reflection& reflection);
 
 // finish.cpp
@@ -35,10 +37,17 @@ void place_reserved(Program& program, continuation::Machine& machine, const Link
 void tidy(Program& program, const std::vector<Id>& roots);
 // The entry point's declaration, capabilities, extensions and version.
 void declare_entry(Program& program, Id main, const LinkOptions& options, Reflection& reflection);
+// The entry point's interface: the variables its version asks for that are used.
+void declare_interface(ir::Module& module);
 std::vector<std::string> required_features(const ir::Module& module);
 
 // tools.cpp: SPIRV-Tools as a validator and an optimiser. Empty string: valid.
 std::string validate(const std::vector<uint32_t>& spirv, uint32_t vulkan_minor, bool input);
 bool optimize(std::vector<uint32_t>& spirv, Optimization level, std::string& message);
+
+// partial.cpp: a finished module with stubs in place of its traversal functions, and back: `changed` is what
+// a tool that keeps ids made of the former.
+ir::Module without_traversal(const ir::Module& module);
+ir::Module with_traversal(ir::Module changed, const ir::Module& original);
 
 }  // namespace rtc::link

@@ -43,6 +43,7 @@ class Linker {
         for (const StageInput& stage : input_.stages) modules_.push_back(ir::read_module(stage.spirv, stage.file));
         set_depths();
         import_traversal();
+        link::prepare_push_constants(program_, modules_, result_.reflection);
         std::map<uint32_t, uint32_t> spec_ids;
         for (size_t i = 0; i < input_.stages.size(); ++i) add_stage(static_cast<uint32_t>(i), spec_ids);
         check::check_data_types(program_, data_types_, result_.diagnostics);
@@ -122,8 +123,15 @@ class Linker {
     void add_stage(uint32_t index, std::map<uint32_t, uint32_t>& spec_ids) {
         const StageInput& stage_input = input_.stages[index];
         ir::Module& module = modules_[index];
-        // Always, also when the result's validation is switched off: the passes rely on valid input.
-        const std::string problem = link::validate(ir::write_module(module, false), 3, true);
+        // SPIRV-Tools of 2023 would call it an invalid operand.
+        if (module.has_capability(static_cast<spv::Capability>(5336)))  // RayTracingPositionFetchKHR
+            ir::fail("position-fetch", stage_input.file, 0,
+                     "stage '" + stage_input.name +
+                         "' fetches vertex positions of hits (SPV_KHR_ray_tracing_position_fetch), which is not "
+                         "supported yet; read them from your own vertex buffer by gl_PrimitiveID");
+        // Also when the result's validation is switched off: the passes rely on valid input.
+        const std::string problem =
+            options_.trust_input ? "" : link::validate(ir::write_module(module, false), 3, true);
         if (!problem.empty())
             ir::fail("spirv-invalid", stage_input.file, 0,
                      "stage '" + stage_input.name + "' is not valid SPIR-V: " + problem);
@@ -239,10 +247,7 @@ class Linker {
         link::declare_entry(program_, main_, options_, r);
         link::tidy(program_, {main_});
         main_ = program_.module.entry_points[0].function;
-        // The interface after dead variables are gone.
-        std::set<Id> alive;
-        for (const Inst& inst : program_.module.globals) alive.insert(inst.result);
-        std::erase_if(program_.module.entry_points[0].interface, [&](Id id) { return !alive.count(id); });
+        link::declare_interface(program_.module);
 
         r.flags = (machine_.resumable ? RTC_MODULE_RESUMABLE : 0) |
                   (machine_.addresses() ? RTC_MODULE_ADDRESS_MODE : 0);
@@ -268,12 +273,8 @@ class Linker {
             for (const ir::Block& block : function.blocks)
                 r.instruction_count += static_cast<uint32_t>(block.insts.size() + 1);
 
+        if (options_.optimize != Optimization::None) optimize();
         std::vector<uint32_t> words = ir::write_module(program_.module, options_.debug_info);
-        if (options_.optimize != Optimization::None) {
-            std::string message;
-            if (!link::optimize(words, options_.optimize, message))
-                ir::fail("optimizer", "", 0, "the optimiser failed: " + message);
-        }
         // FNV-1a over the code: the identity every handle of this module carries.
         uint32_t identity = 2166136261u;
         for (uint32_t word : words) identity = (identity ^ word) * 16777619u;
@@ -282,7 +283,12 @@ class Linker {
         embed_reflection(words, r);
         if (options_.validate) {
             const uint32_t minor = r.spirv_version >= 0x00010600u ? 3 : r.spirv_version >= 0x00010400u ? 2 : 1;
+#ifdef NDEBUG
+            const std::string problem =
+                link::validate(ir::write_module(link::without_traversal(program_.module), false), minor, false);
+#else
             const std::string problem = link::validate(words, minor, false);
+#endif
             if (!problem.empty()) {
                 result_.spirv = words;
                 ir::fail("internal-invalid-module", "", 0,
@@ -293,6 +299,19 @@ class Linker {
         result_.dump = options_.stop_after.empty() ? "" : ir::to_text(words);
         result_.spirv = std::move(words);
         result_.ok = true;
+    }
+
+    // SPIRV-Tools' optimiser on everything but traversal.
+    void optimize() {
+        std::vector<uint32_t> words =
+            ir::write_module(link::without_traversal(program_.module), options_.debug_info);
+        std::string message;
+        if (!link::optimize(words, options_.optimize, message))
+            ir::fail("optimizer", "", 0, "the optimiser failed: " + message);
+        program_.module = link::with_traversal(ir::read_module(words, "the optimised module"), program_.module);
+        program_.reindex();
+        link::tidy(program_, {program_.module.entry_points[0].function});
+        link::declare_interface(program_.module);
     }
 
     void make_groups() {

@@ -39,36 +39,6 @@ std::string kind_of(const Program& p, const Inst& variable, Id element) {
     }
 }
 
-uint32_t block_bytes(const Program& p, Id type) {
-    const Inst* inst = p.def(type);
-    switch (inst->op) {
-        case Op::OpTypeInt:
-        case Op::OpTypeFloat: return inst->ops[0] / 8;
-        case Op::OpTypePointer: return 8;
-        case Op::OpTypeVector:
-        case Op::OpTypeMatrix: return inst->ops[1] * block_bytes(p, inst->ops[0]);
-        case Op::OpTypeArray: {
-            uint32_t stride = 0;
-            p.decoration(type, spv::Decoration::ArrayStride, &stride);
-            return stride * p.element_count(type);
-        }
-        case Op::OpTypeStruct: {
-            uint32_t end = 0;
-            for (uint32_t i = 0; i < inst->ops.size(); ++i) {
-                uint32_t offset = 0, stride = 0;
-                p.member_decoration(type, i, spv::Decoration::Offset, &offset);
-                uint32_t size = block_bytes(p, inst->ops[i]);
-                if (p.type_op(inst->ops[i]) == Op::OpTypeMatrix &&
-                    p.member_decoration(type, i, spv::Decoration::MatrixStride, &stride))
-                    size = stride * p.element_count(inst->ops[i]);
-                end = std::max(end, offset + size);
-            }
-            return end;
-        }
-        default: return 0;
-    }
-}
-
 }  // namespace
 
 void unify_resources(Program& p, lower::Stage& stage, ResourceTable& table, Reflection& reflection) {
@@ -77,19 +47,11 @@ void unify_resources(Program& p, lower::Stage& stage, ResourceTable& table, Refl
         const Inst variable = *p.def(id);
         const auto storage = static_cast<StorageClass>(variable.ops[0]);
         if (storage == StorageClass::PushConstant) {
-            reflection.push_constant_bytes =
-                std::max(reflection.push_constant_bytes, block_bytes(p, p.pointee(variable.type)));
-            if (!table.push_constants) {
+            // The stages' blocks agree (prepare_push_constants), so they are one type.
+            if (!table.push_constants)
                 table.push_constants = id;
-                table.push_constants_stage = stage.name;
-            } else if (p.def(table.push_constants)->type == variable.type) {
+            else
                 replaced[id] = table.push_constants;
-            } else {
-                stage.fail("push-constant-conflict", {},
-                           "its push-constant block differs from the one of stage '" + table.push_constants_stage +
-                               "'; one compute shader has one block: declare the same block in both stages",
-                           p);
-            }
             continue;
         }
         if (storage == StorageClass::Input) {
@@ -113,8 +75,18 @@ void unify_resources(Program& p, lower::Stage& stage, ResourceTable& table, Refl
                        "resource '" + p.module.name_of(id) + "' has no descriptor set and binding", p);
         uint32_t count = 1;
         const Id element = element_of(p, p.pointee(variable.type), count);
-        const std::string kind = kind_of(p, variable, element);
+        std::string kind = kind_of(p, variable, element);
         const auto [place, fresh] = table.kinds.emplace(std::make_pair(set, binding), std::make_pair(kind, stage.name));
+        // A combined descriptor holds an image and a sampler, and may be read as either (Vulkan, "Combined Image
+        // Sampler").
+        auto combines = [](const std::string& k) {
+            return k == "combined-image-sampler" || k == "sampled-image" || k == "sampler";
+        };
+        if (!fresh && place->second.first != kind && combines(kind) && combines(place->second.first)) {
+            place->second.first = kind = "combined-image-sampler";
+            for (ResourceReport& other : reflection.resources)
+                if (other.set == set && other.binding == binding) other.type = kind;
+        }
         if (!fresh && place->second.first != kind)
             stage.fail("resource-conflict", {},
                        "set " + std::to_string(set) + " binding " + std::to_string(binding) + " ('" +

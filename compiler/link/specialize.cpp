@@ -1,4 +1,6 @@
 // Specialisation constants of a stage instance: baked in, or renumbered for the pipeline.
+#include <set>
+
 #include "link/link.h"
 
 namespace rtc::link {
@@ -20,6 +22,14 @@ void specialize(ir::Module& module, const StageInput& stage, std::map<uint32_t, 
                 std::vector<SpecConstantReport>& report) {
     std::map<uint32_t, uint64_t> given;
     for (const SpecValue& value : stage.specialization) given[value.id] = value.value;
+    // Which variable a call passes is decided here and now: an open constant that says so keeps its default.
+    std::set<Id> locations;
+    for (const ir::Function& function : module.functions)
+        for (const ir::Block& block : function.blocks)
+            for (const Inst& inst : block.insts) {
+                if (inst.op == Op::OpTraceNV) locations.insert(inst.ops[10]);
+                if (inst.op == Op::OpExecuteCallableNV) locations.insert(inst.ops[1]);
+            }
     std::map<Id, uint32_t> spec_ids;
     std::map<uint32_t, bool> met;
     for (const Inst& inst : module.decorations)
@@ -47,6 +57,10 @@ void specialize(ir::Module& module, const StageInput& stage, std::map<uint32_t, 
                 inst.ops[0] = static_cast<uint32_t>(value->second);
                 if (inst.ops.size() > 1) inst.ops[1] = static_cast<uint32_t>(value->second >> 32);
             }
+            continue;
+        }
+        if (locations.count(inst.result)) {
+            inst.op = Op::OpConstant;
             continue;
         }
         uint32_t id = found->second;

@@ -55,25 +55,39 @@ void select_entry(Program& program, Stage& stage, std::vector<Function> function
         stage.fail("entry-point-missing", {}, "the entry point's function has no body", program);
     walk(by_id[entry]);
 
-    ir::IdSet used;
+    ir::IdSet used, used_elsewhere;
     for (size_t i = 0; i < functions.size(); ++i) {
-        if (marks[i] != Black) continue;
+        ir::IdSet& set = marks[i] == Black ? used : used_elsewhere;
         for (const Block& block : functions[i].blocks)
-            for (const Inst& inst : block.insts) inst.for_each_id([&](Id id) { used.insert(id); });
+            for (const Inst& inst : block.insts) inst.for_each_id([&](Id id) { set.insert(id); });
+        if (marks[i] != Black) continue;
         if (functions[i].id() == entry)
             stage.body = std::move(functions[i]);
         else
             stage.functions.push_back(std::move(functions[i]));
     }
+    // NV's calls name their data by location only, so data that nothing mentions belongs to the stage too. What only
+    // another entry point of the module mentions does where this stage could pass it, after its own.
+    const bool traces = stage.kind == StageKind::RayGen || stage.kind == StageKind::ClosestHit || stage.kind == StageKind::Miss;
+    std::vector<Id> others;
     for (const Inst& inst : program.module.globals) {
         if (inst.op != Op::OpVariable || !module_variables.count(inst.result)) continue;
         const auto storage = static_cast<spv::StorageClass>(inst.ops[0]);
-        // NV's calls name their data by location only.
-        const bool call_data =
-            storage == spv::StorageClass::RayPayloadKHR || storage == spv::StorageClass::CallableDataKHR ||
-            storage == spv::StorageClass::IncomingRayPayloadKHR || storage == spv::StorageClass::IncomingCallableDataKHR;
-        if (call_data || used.count(inst.result)) stage.variables.push_back(inst.result);
+        if (used.contains(inst.result)) {
+            stage.variables.push_back(inst.result);
+            continue;
+        }
+        const bool elsewhere = used_elsewhere.contains(inst.result);
+        const bool incoming = storage == spv::StorageClass::IncomingRayPayloadKHR ||
+                              storage == spv::StorageClass::IncomingCallableDataKHR;
+        const bool payload = storage == spv::StorageClass::RayPayloadKHR;
+        const bool data = storage == spv::StorageClass::CallableDataKHR;
+        if (!elsewhere && (incoming || payload || data))
+            stage.variables.push_back(inst.result);
+        else if (elsewhere && ((payload && traces) || (data && (traces || stage.kind == StageKind::Callable))))
+            others.push_back(inst.result);
     }
+    stage.variables.insert(stage.variables.end(), others.begin(), others.end());
 }
 
 }  // namespace rtc::lower

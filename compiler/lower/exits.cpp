@@ -5,6 +5,9 @@
 // (GLSL_NV_ray_tracing 8.19). They become KHR's terminators; what followed them in
 // the block is dropped.
 //
+// Scope ShaderCallKHR is the set of calls one invocation makes. All of them run in one compute invocation, so
+// barriers of that scope are none, and atomics and accesses take the workgroup's scope, which holds it.
+//
 // OpTraceNV and OpExecuteCallableNV name their data by a constant location. The
 // location is resolved within the calling stage only: the callee's own location
 // means nothing (real shaders get it wrong and drivers do not look).
@@ -31,6 +34,42 @@ Id variable_at_location(const Program& program, const Stage& stage, const Inst& 
                "no " + std::string(what) + " variable of this stage has location " + std::to_string(location) +
                    "; declare one with layout(location = " + std::to_string(location) + ")",
                program);
+}
+
+bool is_shader_call(const Program& program, Id scope) {
+    uint64_t value = 0;
+    return program.constant_value(scope, value) && value == static_cast<uint64_t>(spv::Scope::ShaderCallKHR);
+}
+
+void normalize_scopes(Program& program, Function& function) {
+    const Id workgroup = program.constant_u32(static_cast<uint32_t>(spv::Scope::Workgroup));
+    auto widen = [&](Id& scope) {
+        if (is_shader_call(program, scope)) scope = workgroup;
+    };
+    // Memory operands from `at` on: a mask, then an alignment and scopes for the bits that have one.
+    auto memory = [&](ir::Words& ops, size_t at) {
+        if (at >= ops.size()) return;
+        const uint32_t mask = ops[at++];
+        if (mask & 0x2) ++at;
+        for (uint32_t bit : {0x8u, 0x10u})
+            if ((mask & bit) && at < ops.size()) widen(ops[at++]);
+    };
+    for (Block& block : function.blocks) {
+        std::erase_if(block.insts, [&](const Inst& inst) {
+            return inst.op == Op::OpMemoryBarrier && is_shader_call(program, inst.ops[0]);
+        });
+        for (Inst& inst : block.insts) {
+            const auto op = static_cast<uint32_t>(inst.op);
+            if (op >= static_cast<uint32_t>(Op::OpAtomicLoad) && op <= static_cast<uint32_t>(Op::OpAtomicXor))
+                widen(inst.ops[1]);
+            else if (inst.op == Op::OpLoad)
+                memory(inst.ops, 1);
+            else if (inst.op == Op::OpStore || inst.op == Op::OpCopyMemory)
+                memory(inst.ops, 2);
+            else if (inst.op == Op::OpImageRead || inst.op == Op::OpImageWrite)
+                for (size_t i = inst.op == Op::OpImageRead ? 3 : 4; i < inst.ops.size(); ++i) widen(inst.ops[i]);
+        }
+    }
 }
 
 void normalize_function(Program& program, Stage& stage, Function& function) {
@@ -86,8 +125,12 @@ void normalize_function(Program& program, Stage& stage, Function& function) {
 }  // namespace
 
 void normalize_calls(Program& program, Stage& stage) {
-    normalize_function(program, stage, stage.body);
-    for (Function& function : stage.functions) normalize_function(program, stage, function);
+    auto normalize = [&](Function& function) {
+        normalize_function(program, stage, function);
+        normalize_scopes(program, function);
+    };
+    normalize(stage.body);
+    for (Function& function : stage.functions) normalize(function);
 }
 
 }  // namespace rtc::lower

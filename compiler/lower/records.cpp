@@ -1,5 +1,7 @@
 // Reads of the shader record become word loads from the SBT region the record lies
 // in, whatever the block's layout: offsets and strides come from its decorations.
+// So do reads of push constants when stages declare different blocks: one compute
+// shader has one push-constant block, and words can be read as any of them.
 #include <unordered_map>
 
 #include "continuation/machine.h"
@@ -11,8 +13,8 @@ namespace {
 
 class Records {
   public:
-    Records(Program& program, Stage& stage, continuation::Machine& machine)
-        : p_(program), stage_(stage), m_(machine) {
+    Records(Program& program, Stage& stage, continuation::Machine& machine, spv::StorageClass storage)
+        : p_(program), stage_(stage), m_(machine), storage_(storage) {
         switch (stage.kind) {
             case StageKind::RayGen: word_function_ = "rtc_sbt_raygen_word"; break;
             case StageKind::Miss: word_function_ = "rtc_sbt_miss_word"; break;
@@ -23,19 +25,22 @@ class Records {
 
     void run() {
         for (Id id : stage_.variables)
-            if (static_cast<spv::StorageClass>(p_.def(id)->ops[0]) == spv::StorageClass::ShaderRecordBufferKHR) {
+            if (static_cast<spv::StorageClass>(p_.def(id)->ops[0]) == storage_) {
                 if (record_)
-                    stage_.fail("several-records", {}, "a stage may use only one shader record block", p_);
+                    stage_.fail("several-records", {}, "a stage may use only one " + what() + " block", p_);
                 record_ = id;
             }
         if (!record_) return;
-        stage_.record_bytes = extent(p_.pointee(p_.def(record_)->type));
+        if (is_record()) stage_.record_bytes = extent(p_.pointee(p_.def(record_)->type));
         run_function(stage_.body);
         for (Function& function : stage_.functions) run_function(function);
         std::erase(stage_.variables, record_);
     }
 
   private:
+    bool is_record() const { return storage_ == spv::StorageClass::ShaderRecordBufferKHR; }
+    std::string what() const { return is_record() ? "shader record" : "push-constant"; }
+
     // Where a pointer into the record points: constant bytes plus an optional run-time part.
     struct Place {
         Id dynamic = 0;  // uint bytes, 0: none
@@ -115,7 +120,7 @@ class Records {
                 to.type = type.ops[0];
                 stride = from.row_major && from.matrix_stride ? from.matrix_stride : scalar_bytes(type.ops[0]);
                 break;
-            default: stage_.fail("record-access", inst.source, "unsupported access into the shader record", p_);
+            default: stage_.fail("record-access", inst.source, "unsupported access into the " + what() + " block", p_);
         }
         if (known) {
             to.bytes += stride * static_cast<uint32_t>(constant);
@@ -136,6 +141,15 @@ class Records {
     }
 
     Id word(ir::Emitter& e, const Place& place) {
+        if (!is_record()) {
+            Id at = p_.constant_u32(place.bytes / 4);
+            if (place.dynamic) {
+                const Id words = e.value(Op::OpShiftRightLogical, p_.uint_type(), {place.dynamic, p_.constant_u32(2)});
+                at = place.bytes / 4 ? e.add(words, at) : words;
+            }
+            return e.load(p_.uint_type(), e.chain(spv::StorageClass::PushConstant, p_.uint_type(), p_.push_words,
+                                                  {p_.constant_u32(0), at}));
+        }
         Id at = e.load(p_.uint_type(), stage_.record_base);
         if (place.dynamic)
             at = e.add(at, e.value(Op::OpShiftRightLogical, p_.uint_type(), {place.dynamic, p_.constant_u32(2)}));
@@ -217,7 +231,7 @@ class Records {
                 inst.for_each_id([&](Id id) { touches |= places.count(id) != 0; });
                 if (touches)
                     stage_.fail("record-access", inst.source,
-                                "the shader record can only be read, member by member or whole", p_);
+                                "the " + what() + " block can only be read, member by member or whole", p_);
                 out.push_back(std::move(inst));
             }
             block.insts = std::move(out);
@@ -227,6 +241,7 @@ class Records {
     Program& p_;
     Stage& stage_;
     continuation::Machine& m_;
+    spv::StorageClass storage_;
     std::string word_function_;
     Id record_ = 0;
     std::unordered_map<Id, Id> value_types_;
@@ -235,7 +250,8 @@ class Records {
 }  // namespace
 
 void lower_records(Program& program, Stage& stage, continuation::Machine& machine) {
-    Records(program, stage, machine).run();
+    Records(program, stage, machine, spv::StorageClass::ShaderRecordBufferKHR).run();
+    if (program.push_words) Records(program, stage, machine, spv::StorageClass::PushConstant).run();
 }
 
 }  // namespace rtc::lower

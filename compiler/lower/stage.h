@@ -77,7 +77,8 @@ void inline_calls(Program& program, Stage& stage, const CallKinds& kinds);
 // Private; built-ins become Private variables set on entry or globals of the traversal.
 void lower_interface(Program& program, Stage& stage, continuation::Machine& machine);
 
-// records.cpp: loads from the shader record become word loads from the SBT.
+// records.cpp: loads from the shader record become word loads from the SBT; where Program::push_words is set,
+// loads of push constants become loads of its words.
 void lower_records(Program& program, Stage& stage, continuation::Machine& machine);
 
 // memory.cpp: every call ends its block, no phi is left, and no value is used outside the block that makes it.

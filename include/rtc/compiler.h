@@ -111,6 +111,12 @@ typedef enum rtcc_addressing {
     RTCC_ADDRESSING_MAX_ENUM = 0x7fffffff
 } rtcc_addressing;
 
+typedef enum rtcc_compat {
+    RTCC_COMPAT_NONE = 0,
+    RTCC_COMPAT_GDC2019 = 1, /* spellings of the talk "RTX on Vulkan" (GDC 2019) that have one meaning today */
+    RTCC_COMPAT_MAX_ENUM = 0x7fffffff
+} rtcc_compat;
+
 typedef enum rtcc_optimization {
     RTCC_OPTIMIZATION_NONE = 0,
     RTCC_OPTIMIZATION_PERFORMANCE = 1,
@@ -205,6 +211,10 @@ RTCC_EXPORT rtcc_status rtcc_options_set_validate(rtcc_options_t options, int en
  * device address, which needs bufferDeviceAddress and lifts the heap's size limits. The runtime's
  * acceleration structures must be bound the same way. */
 RTCC_EXPORT rtcc_status rtcc_options_set_addressing(rtcc_options_t options, rtcc_addressing addressing);
+/* GLSL that is accepted beside the extensions as published. Default none. With GDC2019: blocks without an instance
+ * used by their block's name, a missing `;` after a block, a missing `uniform` before opaque types,
+ * gl_GlobalInvocationIDNV and gl_hitTNV. Included files are taken as they are. */
+RTCC_EXPORT rtcc_status rtcc_options_set_compat(rtcc_options_t options, rtcc_compat compat);
 /* Lanes can suspend and be resumed by a later dispatch. Default 1. */
 RTCC_EXPORT rtcc_status rtcc_options_set_resumable(rtcc_options_t options, int enable);
 RTCC_EXPORT rtcc_status rtcc_options_set_warnings_as_errors(rtcc_options_t options, int enable);

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "golden_case.h"
+#include "link/link.h"
 
 namespace rtc::test {
 namespace {
@@ -75,6 +76,22 @@ TEST_P(Golden, LinksToTheSameValidModuleOnEveryThread) {
     LinkResult second;
     std::thread([&] { second = link_pipeline(golden.input, golden.options); }).join();
     EXPECT_TRUE(first.spirv == second.spirv) << "linking is not deterministic";
+
+    // The linker leaves traversal out of what it validates and optimises; here the whole module is looked at.
+    const auto check = [](const LinkResult& result) {
+        const uint32_t version = result.reflection.spirv_version;
+        return link::validate(result.spirv, version >= 0x00010600u ? 3 : version >= 0x00010400u ? 2 : 1, false);
+    };
+    EXPECT_EQ(check(first), "");
+    golden.options.optimize = Optimization::Performance;
+    const LinkResult optimized = link_pipeline(golden.input, golden.options);
+    ASSERT_TRUE(optimized.ok) << errors(optimized);
+    EXPECT_EQ(check(optimized), "");
+    golden.options.addressing = Addressing::Address;
+    golden.options.resumable = false;
+    const LinkResult addresses = link_pipeline(golden.input, golden.options);
+    ASSERT_TRUE(addresses.ok) << errors(addresses);
+    EXPECT_EQ(check(addresses), "");
 }
 
 INSTANTIATE_TEST_SUITE_P(Sets, Golden, testing::ValuesIn(golden_folders(RTC_GOLDEN_DIR)),

@@ -186,7 +186,7 @@ class Parser {
 
     static bool takes_value(std::string_view name) {
         for (std::string_view known :
-             {"--addressing", "--hit-group", "--stage", "--pipeline", "--reflect", "--target-env", "--max-recursion-depth",
+             {"--addressing", "--compat", "--hit-group", "--stage", "--pipeline", "--reflect", "--target-env", "--max-recursion-depth",
               "--max-callable-depth", "--reserved", "--dump-after"})
             if (name == known) return true;
         return false;
@@ -227,6 +227,10 @@ class Parser {
                 throw UsageError("invalid value '" + value + "' in '--addressing=" + value +
                                  "': expected heap or address");
             out_.addressing = value == "address" ? RTCC_ADDRESSING_ADDRESS : RTCC_ADDRESSING_HEAP;
+        } else if (name == "--compat") {
+            if (value != "gdc2019")
+                throw UsageError("invalid value '" + value + "' in '--compat=" + value + "': expected gdc2019");
+            out_.compat = RTCC_COMPAT_GDC2019;
         } else if (name == "--max-recursion-depth") {
             out_.recursion_depth = number_between(name, value, 1, 31);
         } else if (name == "--max-callable-depth") {

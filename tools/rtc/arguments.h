@@ -49,6 +49,7 @@ struct Arguments {
     rtcc_optimization optimization = RTCC_OPTIMIZATION_NONE;
     rtcc_target_env target = RTCC_TARGET_AUTO;
     rtcc_addressing addressing = RTCC_ADDRESSING_HEAP;
+    rtcc_compat compat = RTCC_COMPAT_NONE;
     std::optional<uint32_t> recursion_depth, callable_depth;
     std::optional<int32_t> reserved_set;
     uint32_t reserved_binding = 0;

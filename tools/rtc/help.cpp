@@ -19,6 +19,9 @@ Options:
                     plain Vulkan 1.1) or address (needs bufferDeviceAddress).
   -c                Only compile: each GLSL file to its own SPIR-V stage
                     (FILE.spv), nothing is linked.
+  --compat=gdc2019  Accept spellings of "RTX on Vulkan" (GDC 2019): blocks used
+                    by their block's name, missing `uniform`,
+                    gl_GlobalInvocationIDNV, gl_hitTNV.
   -Dmacro[=defn]    Add an implicit macro definition.
   --dump-after=<pass>
                     Print the module after that pass and stop (for rtc's tests).

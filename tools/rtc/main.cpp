@@ -54,6 +54,7 @@ Options make_options(const Arguments& arguments) {
         rtcc_options_set_reserved(o, *arguments.reserved_set, arguments.reserved_binding);
     rtcc_options_set_validate(o, arguments.validate);
     rtcc_options_set_addressing(o, arguments.addressing);
+    rtcc_options_set_compat(o, arguments.compat);
     rtcc_options_set_resumable(o, arguments.resumable);
     // As glslc has it, -M implies -w: only what it finds matters.
     rtcc_options_set_suppress_warnings(o,

@@ -129,6 +129,22 @@ TEST_F(Target, Addressing) {
     EXPECT_THAT(run.err, HasSubstr("expected heap or address"));
 }
 
+TEST_F(Target, Compat) {
+    copy_shaders("nv");
+    write("old.rgen",
+          "#version 460\n#extension GL_NV_ray_tracing : require\n"
+               "layout(set = 0, binding = 0) accelerationStructureNV scene;\n"
+               "layout(location = 0) rayPayloadNV payload { vec4 color; }\n"
+               "void main() {\n    payload.color = vec4(gl_GlobalInvocationIDNV, 0.0);\n"
+               "    traceNV(scene, 0u, 0xffu, 0u, 0u, 0u, vec3(0.0), 0.0, payload.color.xyz, 1.0, 0);\n}\n");
+    EXPECT_EQ(rtc("old.rgen -o old.spv").status, 1);
+    const CliRun run = rtc("old.rgen --compat=gdc2019 -o old.spv");
+    EXPECT_EQ(run.status, 0) << run.err;
+    const CliRun bad = rtc("old.rgen --compat=gdc2018");
+    EXPECT_EQ(bad.status, 2);
+    EXPECT_THAT(bad.err, HasSubstr("expected gdc2019"));
+}
+
 TEST_F(Target, NoResumable) {
     EXPECT_THAT(reflection("")["flags"].dump(), HasSubstr("resumable"));
     EXPECT_THAT(reflection("--no-resumable")["flags"].dump(), Not(HasSubstr("resumable")));

@@ -74,8 +74,7 @@ TEST(Diagnostics, TheTestsOwnStagesLink) {
 TEST(Diagnostics, TraceLocations) {
     const auto trace = [](const char* payload) { return trace_text("%uint_0", "%uint_255", "%uint_0", "%uint_0", payload); };
     expect_error(raygen(kPayload, trace("%uint_255"), kPayloadLocation), "trace-location-unknown");
-    expect_error(raygen(std::string(kPayload) + "%number = OpSpecConstant %uint 0\n", trace("%number"),
-                        std::string(kPayloadLocation) + "OpDecorate %number SpecId 1\n"),
+    expect_error(raygen(kPayload, "%number = OpIAdd %uint %uint_0 %uint_0\n" + trace("%number"), kPayloadLocation),
                  "trace-location-not-constant");
 }
 
@@ -252,17 +251,10 @@ TEST(Diagnostics, ResourceConflict) {
                  "resource-conflict");
 }
 
-TEST(Diagnostics, PushConstantConflict) {
-    const auto pushes = [](const char* model, const char* type) {
-        return module_of(stage(model,
-                               std::string("%block = OpTypeStruct ") + type +
-                                   "\n%pb = OpTypePointer PushConstant %block\n%pf = OpTypePointer PushConstant " + type +
-                                   "\n%constants = OpVariable %pb PushConstant\n",
-                               std::string("%x = OpAccessChain %pf %constants %uint_0\n%v = OpLoad ") + type + " %x\n",
-                               kBlockLayout));
-    };
-    expect_error(link({{StageKind::RayGen, pushes("RayGenerationNV", "%float")}, {StageKind::Miss, pushes("MissNV", "%uint")}}),
-                 "push-constant-conflict");
+TEST(Diagnostics, PositionFetch) {
+    std::vector<uint32_t> words = module_of(tracing_raygen());
+    words.insert(words.begin() + 5, {2u << 16 | 17u, 5336u});  // OpCapability RayTracingPositionFetchKHR
+    expect_error(link({{StageKind::RayGen, words}}), "position-fetch");
 }
 
 TEST(Diagnostics, ReservedConflict) {

@@ -171,6 +171,58 @@ TEST(Glsl, ThePrintedSeedShadersSayWhatToWrite) {
         EXPECT_THAT(hit, HasSubstr(advice));
 }
 
+std::string printed(const char* name) {
+    std::ifstream stream(std::string(RTC_SHADERS) + "/seed/printed/" + name, std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+}
+
+std::string with(std::string text, const std::string& from, const std::string& to) {
+    const size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    return at == std::string::npos ? text : text.replace(at, from.size(), to);
+}
+
+// --compat=gdc2019 accepts what has one meaning today. The rest stays an error that says what to write: the version
+// and the extension, an image without a format, a function that is not given, coordinates that are unsigned.
+TEST(Glsl, ThePrintedSeedShadersCompileInCompatibilityMode) {
+    const std::string head = "#version 460\n#extension GL_NV_ray_tracing : require\n";
+    rtc::FrontendOptions compat;
+    compat.gdc2019 = true;
+    const std::string hit = head + printed("closesthit.rchit");
+    EXPECT_FALSE(rtc::compile_glsl({std::nullopt, "closesthit.rchit", hit}, {}).ok);
+    EXPECT_EQ(errors_of(rtc::compile_glsl({std::nullopt, "closesthit.rchit", hit}, compat)), "");
+
+    std::string raygen = head + printed("raygen.rgen");
+    const std::string errors = errors_of(rtc::compile_glsl({std::nullopt, "raygen.rgen", raygen}, compat));
+    for (const char* advice : {"declare it writeonly", "computeDir", "convert gl_LaunchIDNV.xy with ivec2"})
+        EXPECT_THAT(errors, HasSubstr(advice));
+    for (const char* accepted : {"write `uniform`", "end it with", "gl_GlobalInvocationIDNV", "instance"})
+        EXPECT_THAT(errors, testing::Not(HasSubstr(accepted)));
+    raygen = with(raygen, "image2D", "writeonly image2D");
+    raygen = with(raygen, "void main", "vec3 computeDir(uvec2 pixel, vec3 dir) { return dir; }\nvoid main");
+    raygen = with(raygen, "Image, gl_GlobalInvocationIDNV.xy", "Image, ivec2(gl_GlobalInvocationIDNV.xy)");
+    const rtc::FrontendResult result = rtc::compile_glsl({std::nullopt, "raygen.rgen", raygen}, compat);
+    EXPECT_EQ(errors_of(result), "");
+    EXPECT_TRUE(result.ok);
+}
+
+// Two blocks with members of one name are told apart by their block names.
+TEST(Glsl, CompatibilityModeKeepsBlocksApart) {
+    rtc::FrontendOptions compat;
+    compat.gdc2019 = true;
+    const rtc::FrontendResult result = rtc::compile_glsl(
+        {rtc::StageKind::RayGen, "a.rgen",
+         "#version 460\n#extension GL_NV_ray_tracing : require\n"
+         "layout(location = 1) rayPayloadNV firstInterface { vec4 color; }\n"
+         "layout(location = 2) rayPayloadNV secondInterface { float color[2]; /* } */ };\n"
+         "struct Plain { vec4 color; };\n"
+         "void main() {\n    Plain p;\n    p.color = firstInterface.color; // secondInterface.color\n"
+         "    secondInterface.color[1] = p.color.x;\n    nonsense;\n}\n"},
+        compat);
+    ASSERT_EQ(result.diagnostics.size(), 1u) << errors_of(result);
+    EXPECT_EQ(result.diagnostics[0].line, 10u);
+}
+
 TEST(Glsl, BlockNamesUsedAsVariablesAreExplained) {
     const rtc::FrontendResult result =
         rtc::compile_glsl({rtc::StageKind::RayGen, "a.rgen",
