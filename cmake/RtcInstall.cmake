@@ -6,6 +6,10 @@ include(CMakePackageConfigHelpers)
 set(RTC_PACKAGE_DIR ${CMAKE_INSTALL_LIBDIR}/cmake/rtc)
 set(RTC_INSTALLED "")
 
+# Joins the two components; of use only where both are installed.
+install(FILES ${PROJECT_SOURCE_DIR}/include/rtc/runtime_compiler.h
+  COMPONENT runtime DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/rtc)
+
 # One component: its header, its libraries as exported targets, its pkg-config file (which names `library`).
 # The first target is rtc::<component>; others keep their own EXPORT_NAME.
 function(rtc_install_component component library description)

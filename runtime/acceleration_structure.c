@@ -49,7 +49,8 @@ bool rtr_vertex_format(VkFormat format, uint32_t* code, uint32_t* bytes, uint32_
 static VkResult check_triangles(RtrDevice d, const VkGeometryTrianglesNV* t, unsigned g,
                                 uint32_t* primitives) {
     uint32_t code, bytes, component;
-    if (t->pNext) return bad(d, "pNext", "VkGeometryTrianglesNV::pNext must be NULL", g);
+    VkResult r = rtr_check_chain(d, "VkGeometryTrianglesNV", t->pNext);
+    if (r != VK_SUCCESS) return r;
     if (!rtr_vertex_format(t->vertexFormat, &code, &bytes, &component))
         return rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "vertex-format",
                          "acceleration structure, geometry %u: vertex format %d; VK_NV_ray_tracing lists "
@@ -69,16 +70,17 @@ static VkResult check_triangles(RtrDevice d, const VkGeometryTrianglesNV* t, uns
             if (t->vertexCount % 3)
                 return bad(d, "vertex-count", "vertexCount must be a multiple of 3 without indices", g);
             break;
+        case VK_INDEX_TYPE_UINT8_EXT:
         case VK_INDEX_TYPE_UINT16:
         case VK_INDEX_TYPE_UINT32:
-            if (t->indexOffset % (t->indexType == VK_INDEX_TYPE_UINT16 ? 2 : 4))
+            if (t->indexOffset % rtr_index_size(t->indexType))
                 return bad(d, "index-offset", "indexOffset must be a multiple of the index size", g);
             if (t->indexCount % 3) return bad(d, "index-count", "indexCount must be a multiple of 3", g);
             if (t->indexCount && !t->vertexCount) return bad(d, "vertex-count", "indices but no vertices", g);
             *primitives = t->indexCount / 3;
             break;
         default:
-            return bad(d, "index-type", "indexType must be NONE_NV, UINT16 or UINT32", g);
+            return bad(d, "index-type", "indexType must be NONE_NV, UINT8_EXT, UINT16 or UINT32", g);
     }
     if (t->transformOffset % 16)
         return bad(d, "transform-offset", "transformOffset must be a multiple of 16", g);
@@ -86,7 +88,8 @@ static VkResult check_triangles(RtrDevice d, const VkGeometryTrianglesNV* t, uns
 }
 
 static VkResult check_aabbs(RtrDevice d, const VkGeometryAABBNV* b, unsigned g, uint32_t* primitives) {
-    if (b->pNext) return bad(d, "pNext", "VkGeometryAABBNV::pNext must be NULL", g);
+    VkResult r = rtr_check_chain(d, "VkGeometryAABBNV", b->pNext);
+    if (r != VK_SUCCESS) return r;
     if (b->stride % 8 != 0 || (b->stride < 24 && b->numAABBs > 1))
         return bad(d, "aabb-stride", "stride must be a multiple of 8 and at least 24", g);
     if (b->offset % 8 != 0) return bad(d, "aabb-offset", "offset must be a multiple of 8", g);
@@ -95,7 +98,8 @@ static VkResult check_aabbs(RtrDevice d, const VkGeometryAABBNV* b, unsigned g, 
 }
 
 VkResult rtr_check_geometry(RtrDevice d, const VkGeometryNV* g, unsigned index, uint32_t* primitives) {
-    if (g->pNext) return bad(d, "pNext", "VkGeometryNV::pNext must be NULL", index);
+    VkResult r = rtr_check_chain(d, "VkGeometryNV", g->pNext);
+    if (r != VK_SUCCESS) return r;
     if (g->geometryType == VK_GEOMETRY_TYPE_TRIANGLES_NV)
         return check_triangles(d, &g->geometry.triangles, index, primitives);
     if (g->geometryType == VK_GEOMETRY_TYPE_AABBS_NV)
@@ -155,9 +159,9 @@ VkResult rtrCreateAccelerationStructure(RtrDevice d, const VkAccelerationStructu
     RtrAccelerationStructure as;
     VkResult r;
     *pAs = NULL;
-    if (info->pNext || info->info.pNext)
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "pNext",
-                         "VkAccelerationStructureCreateInfoNV: pNext must be NULL");
+    if ((r = rtr_check_chain(d, "VkAccelerationStructureCreateInfoNV", info->pNext)) != VK_SUCCESS ||
+        (r = rtr_check_chain(d, "VkAccelerationStructureInfoNV", info->info.pNext)) != VK_SUCCESS)
+        return r;
     if (info->compactedSize && (info->info.geometryCount || info->info.instanceCount))
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "compacted-size",
                          "with compactedSize, geometryCount and instanceCount must be 0");
@@ -235,9 +239,8 @@ VkResult rtrBindAccelerationStructureMemory(RtrDevice d, uint32_t count,
     uint32_t i;
     for (i = 0; i < count; i++) {
         const RtrBindAccelerationStructureMemoryInfo* b = &infos[i];
-        if (b->pNext)
-            return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "pNext",
-                             "RtrBindAccelerationStructureMemoryInfo::pNext must be NULL");
+        VkResult r = rtr_check_chain(d, "RtrBindAccelerationStructureMemoryInfo", b->pNext);
+        if (r != VK_SUCCESS) return r;
         RtrAccelerationStructure as = b->accelerationStructure;
         if (!as || as->buffer || !b->heap == !b->buffer)
             return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "bind",
@@ -245,7 +248,7 @@ VkResult rtrBindAccelerationStructureMemory(RtrDevice d, uint32_t count,
                              "mode) a buffer, not both",
                              i);
         if (b->buffer) {
-            VkResult r = bind_address(d, as, b->buffer, b->bufferOffset, i);
+            r = bind_address(d, as, b->buffer, b->bufferOffset, i);
             if (r != VK_SUCCESS) return r;
             continue;
         }
@@ -290,5 +293,35 @@ VkResult rtrGetNullAccelerationStructureDescriptor(RtrDevice d, RtrHeap heap, Vk
     info->buffer = heap->buffer;
     info->offset = heap->offset;
     info->range = RTC_AS_HEADER_QUADS * RTC_QUAD_BYTES;
+    return VK_SUCCESS;
+}
+
+VkResult rtrUpdateAccelerationStructureDescriptors(RtrDevice d, VkDescriptorSet set, uint32_t binding,
+                                                   uint32_t element, uint32_t count,
+                                                   const RtrAccelerationStructure* structures,
+                                                   RtrHeap null_heap) {
+    VkDescriptorBufferInfo infos[64];
+    VkWriteDescriptorSet write = {.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET};
+    uint32_t at, i;
+    for (i = 0; i < count; i++) {
+        if (structures[i] ? !structures[i]->buffer : !null_heap)
+            return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "not-bound", "structure %u of %u is %s", i,
+                             count, structures[i] ? "not bound" : "NULL, and there is no nullHeap");
+    }
+    write.dstSet = set;
+    write.dstBinding = binding;
+    write.descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+    write.pBufferInfo = infos;
+    for (at = 0; at < count; at += 64) {
+        write.dstArrayElement = element + at;
+        write.descriptorCount = count - at < 64 ? count - at : 64;
+        for (i = 0; i < write.descriptorCount; i++) {
+            if (structures[at + i])
+                infos[i] = rtr_header_info(structures[at + i]);
+            else
+                rtrGetNullAccelerationStructureDescriptor(d, null_heap, &infos[i]);
+        }
+        d->vk.UpdateDescriptorSets(d->device, 1, &write, 0, NULL);
+    }
     return VK_SUCCESS;
 }

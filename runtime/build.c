@@ -195,12 +195,11 @@ static VkResult check_build(RtrBuild* b, const VkAccelerationStructureInfoNV* in
     const bool top = info->type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV;
     uint64_t total = 0;
     uint32_t g;
+    VkResult r;
     if (!b->recorder->cmd)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "recorder-not-begun",
                          "build: rtrBeginRecorder first");
-    if (info->pNext)
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "pNext",
-                         "VkAccelerationStructureInfoNV::pNext must be NULL");
+    if ((r = rtr_check_chain(d, "VkAccelerationStructureInfoNV", info->pNext)) != VK_SUCCESS) return r;
     if (!dst || !dst->buffer)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "not-bound", "build: dst is not bound");
     if (info->type != dst->type || info->flags != dst->flags)
@@ -236,8 +235,7 @@ static VkResult check_build(RtrBuild* b, const VkAccelerationStructureInfoNV* in
                              dst->geometry_count);
         for (g = 0; g < info->geometryCount; g++) {
             uint32_t n = 0, made = 0;
-            VkResult r = rtr_check_geometry(d, &info->pGeometries[g], g, &n);
-            if (r != VK_SUCCESS) return r;
+            if ((r = rtr_check_geometry(d, &info->pGeometries[g], g, &n)) != VK_SUCCESS) return r;
             rtr_check_geometry(d, &dst->geometries[g], g, &made);
             if (info->pGeometries[g].geometryType != dst->geometries[g].geometryType || n > made ||
                 (update && info->pGeometries[g].flags != dst->geometries[g].flags))

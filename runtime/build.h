@@ -29,6 +29,10 @@ static inline RtrKernel rtr_instance_kernel(RtrAccelerationStructure dst) {
 
 VkResult rtr_check_geometry(RtrDevice d, const VkGeometryNV* g, unsigned index, uint32_t* primitives);
 
+static inline uint32_t rtr_index_size(VkIndexType type) {
+    return type == VK_INDEX_TYPE_UINT8_EXT ? 1 : type == VK_INDEX_TYPE_UINT16 ? 2 : 4;
+}
+
 /* How a vertex format is read; false when the extension does not list it. */
 bool rtr_vertex_format(VkFormat format, uint32_t* code, uint32_t* bytes, uint32_t* component_bytes);
 

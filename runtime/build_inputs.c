@@ -71,7 +71,7 @@ static VkResult triangles(RtrBuild* b, uint32_t g, uint32_t first, uint32_t coun
     const VkGeometryTrianglesNV* t = &b->geometries[g].geometry.triangles;
     const VkDeviceSize limit = b->device->limits.maxStorageBufferRange - 1024u;
     const bool indexed = t->indexType != VK_INDEX_TYPE_NONE_NV;
-    const VkDeviceSize index_size = t->indexType == VK_INDEX_TYPE_UINT16 ? 2 : 4;
+    const VkDeviceSize index_size = rtr_index_size(t->indexType);
     uint32_t code = 0, size = 12, component = 4;
     const bool known = rtr_vertex_format(t->vertexFormat, &code, &size, &component);
     const VkDeviceSize vertex_bytes =
@@ -95,7 +95,7 @@ static VkResult triangles(RtrBuild* b, uint32_t g, uint32_t first, uint32_t coun
                 window(t->vertexData, t->vertexOffset, t->vertexOffset + vertex_bytes, &b->push.data_offset);
             index = window(t->indexData, begin, begin + n * bytes_each, &b->push.index_offset);
             b->push.vertex_count = t->vertexCount;
-            b->push.index_type = t->indexType == VK_INDEX_TYPE_UINT16 ? RTR_INDEX_16 : RTR_INDEX_32;
+            b->push.index_type = index_size == 1 ? RTR_INDEX_8 : index_size == 2 ? RTR_INDEX_16 : RTR_INDEX_32;
         } else {
             VkDeviceSize begin = t->vertexOffset + at * bytes_each;
             data = window(t->vertexData, begin, begin + (3 * n - 1) * t->vertexStride + size,

@@ -97,10 +97,7 @@ VkResult rtrCreateDevice(const RtrDeviceCreateInfo* info, const VkAllocationCall
         d->message_callback = info->pMessenger->pfnUserCallback;
         d->message_user_data = info->pMessenger->pUserData;
     }
-    if (info->pNext) {
-        r = rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "pNext", "RtrDeviceCreateInfo::pNext must be NULL");
-        goto fail;
-    }
+    if ((r = rtr_check_chain(d, "RtrDeviceCreateInfo", info->pNext)) != VK_SUCCESS) goto fail;
     if (!rtr_load_instance_table(d->instance, info->pfnGetInstanceProcAddr, &d->vki, &missing) ||
         !rtr_load_device_table(&d->vki, d->device, &d->vk, &missing)) {
         r = rtr_error(d, VK_ERROR_INITIALIZATION_FAILED, "entry-point", "Vulkan entry point %s is missing",

@@ -8,8 +8,7 @@ VkResult rtrCreateHeap(RtrDevice d, const RtrHeapCreateInfo* info, const VkAlloc
     RtrHeap h;
     VkResult r;
     *pHeap = NULL;
-    if (info->pNext)
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "pNext", "RtrHeapCreateInfo::pNext must be NULL");
+    if ((r = rtr_check_chain(d, "RtrHeapCreateInfo", info->pNext)) != VK_SUCCESS) return r;
     if (!info->buffer || info->offset % RTC_AS_ALIGNMENT != 0 || info->size < 2 * RTC_AS_ALIGNMENT)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "heap-range",
                          "heap: buffer %s, offset %llu must be a multiple of 256, size %llu at least 512",

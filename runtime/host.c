@@ -48,6 +48,22 @@ static void send(RtrDevice device, VkDebugUtilsMessageSeverityFlagBitsEXT severi
                              device->message_user_data);
 }
 
+VkResult rtr_check_chain(RtrDevice device, const char* owner, const void* next) {
+    if (!next) return VK_SUCCESS;
+    return rtr_error(device, VK_ERROR_VALIDATION_FAILED_EXT, "pNext",
+                     "%s::pNext leads to a structure of type %d, which rtc does not know; it must be NULL",
+                     owner, (int)((const VkBaseInStructure*)next)->sType);
+}
+
+void rtrReportMessage(RtrDevice device, VkDebugUtilsMessageSeverityFlagBitsEXT severity, const char* id,
+                      const char* text) {
+    if (severity == VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT) {
+        rtr_error(device, VK_SUCCESS, id, "%s", text);
+    } else {
+        rtr_warning(device, id, "%s", text);
+    }
+}
+
 VkResult rtr_error(RtrDevice device, VkResult result, const char* id, const char* format, ...) {
     va_list arguments;
     va_start(arguments, format);

@@ -225,11 +225,23 @@ struct RtrRecorder_T {
     VkDeviceSize scratch_offset, scratch_size;
     uint64_t max_tile_lanes;
     uint32_t max_rounds;
+    uint32_t stack_size; /* set by the application; 0: not set */
     uint32_t set_call_count;
     RtrBoundSets set_calls[RTR_MAX_SET_CALLS];
     uint32_t push_size;
     uint32_t push_words[RTR_MAX_PUSH_BYTES / 4];
 };
+
+/* What a deferred compilation needs, copied from the application. */
+typedef struct RtrDeferred {
+    VkPipelineCache cache;
+    VkPipelineCreateFlags flags;
+    uint32_t* code;
+    size_t code_size;
+    VkSpecializationMapEntry* entries;
+    void* data;
+    VkSpecializationInfo specialization;
+} RtrDeferred;
 
 struct RtrPipeline_T {
     RtrDevice device;
@@ -242,7 +254,8 @@ struct RtrPipeline_T {
     uint32_t push_size;
     VkDescriptorSetLayout reserved_layout;
     VkPipelineLayout layout;
-    VkPipeline pipeline;
+    VkPipeline pipeline;   /* VK_NULL_HANDLE until a deferred one is compiled */
+    RtrDeferred* deferred; /* NULL when it is compiled */
 };
 
 /* ---- Memory and messages ---------------------------------------------------------- */
@@ -261,6 +274,8 @@ VkResult rtr_error(RtrDevice device, VkResult result, const char* id, const char
     RTR_PRINTF(4, 5);
 void rtr_warning(RtrDevice device, const char* id, const char* format, ...) RTR_PRINTF(3, 4);
 
+/* Success for NULL; else an error that names the structure found behind `owner`::pNext. */
+VkResult rtr_check_chain(RtrDevice device, const char* owner, const void* next);
 VkResult rtr_not_begun(RtrRecorder recorder, const char* function);
 
 /* ---- Recording helpers ---------------------------------------------------------------- */

@@ -210,6 +210,56 @@ static VkResult create_pipeline(RtrDevice d, VkPipelineCache cache,
     return r;
 }
 
+static void forget_deferred(RtrPipeline p, const VkAllocationCallbacks* a) {
+    if (!p->deferred) return;
+    rtr_free(a, p->deferred->code);
+    rtr_free(a, p->deferred->entries);
+    rtr_free(a, p->deferred->data);
+    rtr_free(a, p->deferred);
+    p->deferred = NULL;
+}
+
+/* Keeps what create_pipeline needs until rtrCompileDeferred. */
+static VkResult defer(VkPipelineCache cache, const RtrRayTracingPipelineCreateInfo* info, RtrPipeline p,
+                      const VkAllocationCallbacks* a) {
+    const VkSpecializationInfo* given = info->pSpecializationInfo;
+    RtrDeferred* x = p->deferred = rtr_alloc(a, sizeof *x);
+    if (!x) return VK_ERROR_OUT_OF_HOST_MEMORY;
+    x->cache = cache;
+    x->flags = info->flags;
+    x->code_size = info->codeSize;
+    x->code = rtr_alloc(a, info->codeSize);
+    if (!x->code) return VK_ERROR_OUT_OF_HOST_MEMORY;
+    memcpy(x->code, info->pCode, info->codeSize);
+    if (!given || !given->mapEntryCount) return VK_SUCCESS;
+    x->entries = rtr_alloc(a, given->mapEntryCount * sizeof *x->entries);
+    x->data = rtr_alloc(a, given->dataSize);
+    if (!x->entries || !x->data) return VK_ERROR_OUT_OF_HOST_MEMORY;
+    memcpy(x->entries, given->pMapEntries, given->mapEntryCount * sizeof *x->entries);
+    if (given->dataSize) memcpy(x->data, given->pData, given->dataSize);
+    x->specialization = *given;
+    x->specialization.pMapEntries = x->entries;
+    x->specialization.pData = x->data;
+    return VK_SUCCESS;
+}
+
+VkResult rtrCompileDeferred(RtrDevice d, RtrPipeline p, uint32_t shader,
+                            const VkAllocationCallbacks* allocator) {
+    const VkAllocationCallbacks* a = rtr_pick(d, allocator);
+    RtrRayTracingPipelineCreateInfo info;
+    VkResult r;
+    (void)shader;
+    if (!p->deferred) return VK_SUCCESS;
+    memset(&info, 0, sizeof info);
+    info.flags = p->deferred->flags;
+    info.pCode = p->deferred->code;
+    info.codeSize = p->deferred->code_size;
+    if (p->deferred->entries) info.pSpecializationInfo = &p->deferred->specialization;
+    r = create_pipeline(d, p->deferred->cache, &info, p, a);
+    if (r == VK_SUCCESS) forget_deferred(p, a);
+    return r;
+}
+
 VkResult rtrCreateRayTracingPipeline(RtrDevice d, VkPipelineCache cache,
                                      const RtrRayTracingPipelineCreateInfo* info,
                                      const VkAllocationCallbacks* allocator, RtrPipeline* pPipeline) {
@@ -219,9 +269,7 @@ VkResult rtrCreateRayTracingPipeline(RtrDevice d, VkPipelineCache cache,
     uint32_t i;
     VkResult r;
     *pPipeline = NULL;
-    if (info->pNext)
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "pNext",
-                         "RtrRayTracingPipelineCreateInfo::pNext must be NULL");
+    if ((r = rtr_check_chain(d, "RtrRayTracingPipelineCreateInfo", info->pNext)) != VK_SUCCESS) return r;
     if (info->setLayoutCount > 32)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "set-layouts", "%u set layouts",
                          info->setLayoutCount);
@@ -250,7 +298,9 @@ VkResult rtrCreateRayTracingPipeline(RtrDevice d, VkPipelineCache cache,
     if (r == VK_SUCCESS) r = pick_options(d, &module, info->pOptions, &p->options);
     if (r == VK_SUCCESS) r = check_limits(d, &module, &p->options, p->set_layout_count, p->push_size);
     if (r == VK_SUCCESS) r = create_layout(d, info, p, a);
-    if (r == VK_SUCCESS) r = create_pipeline(d, cache, info, p, a);
+    if (r == VK_SUCCESS)
+        r = info->flags & VK_PIPELINE_CREATE_DEFER_COMPILE_BIT_NV ? defer(cache, info, p, a)
+                                                                  : create_pipeline(d, cache, info, p, a);
     if (r != VK_SUCCESS) {
         rtrDestroyPipeline(d, p, allocator);
         return r;
@@ -265,6 +315,7 @@ void rtrDestroyPipeline(RtrDevice d, RtrPipeline p, const VkAllocationCallbacks*
     d->vk.DestroyPipeline(d->device, p->pipeline, a);
     d->vk.DestroyPipelineLayout(d->device, p->layout, a);
     d->vk.DestroyDescriptorSetLayout(d->device, p->reserved_layout, a);
+    forget_deferred(p, a);
     rtr_free(a, p->groups);
     rtr_free(a, p->json);
     rtr_free(a, p);
@@ -305,4 +356,19 @@ void rtrGetPipelineInfo(RtrPipeline p, RtrPipelineInfo* info) {
     info->reflectionJsonSize = p->header.json_bytes;
     info->layout = p->layout;
     info->pipeline = p->pipeline;
+}
+
+VkDeviceSize rtrGetRayTracingShaderGroupStackSize(RtrDevice d, RtrPipeline p, uint32_t group,
+                                                  VkShaderGroupShaderKHR shader) {
+    (void)d;
+    if (group >= p->header.group_count || p->groups[group].kind != RTC_GROUP_GENERAL ||
+        shader != VK_SHADER_GROUP_SHADER_GENERAL_KHR)
+        return 0;
+    return 4ull * p->header.stack_words;
+}
+
+VkResult rtrCmdSetRayTracingPipelineStackSize(RtrRecorder r, uint32_t size) {
+    if (!r->cmd) return rtr_not_begun(r, "rtrCmdSetRayTracingPipelineStackSize");
+    r->stack_size = size;
+    return VK_SUCCESS;
 }

@@ -8,10 +8,9 @@ VkResult rtrCreateRecorder(RtrDevice d, const RtrRecorderCreateInfo* info,
                            const VkAllocationCallbacks* allocator, RtrRecorder* pRecorder) {
     const VkAllocationCallbacks* a = rtr_pick(d, allocator);
     RtrRecorder r;
+    VkResult result;
     *pRecorder = NULL;
-    if (info->pNext)
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "pNext",
-                         "RtrRecorderCreateInfo::pNext must be NULL");
+    if ((result = rtr_check_chain(d, "RtrRecorderCreateInfo", info->pNext)) != VK_SUCCESS) return result;
     if (info->controlBuffer && info->controlOffset % 256)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "control-offset",
                          "controlOffset %llu must be a multiple of 256",
@@ -53,6 +52,7 @@ VkResult rtrBeginRecorder(RtrRecorder r, VkCommandBuffer cmd) {
     r->pipeline = NULL;
     r->set_call_count = 0;
     r->push_size = 0;
+    r->stack_size = 0;
     return VK_SUCCESS;
 }
 
@@ -77,6 +77,7 @@ VkResult rtrResetRecorder(RtrRecorder r) {
     r->max_rounds = RTR_DEFAULT_ROUNDS;
     r->set_call_count = 0;
     r->push_size = 0;
+    r->stack_size = 0;
     return VK_SUCCESS;
 }
 

@@ -126,3 +126,29 @@ void rtrGetRayTracingProperties(RtrDevice device, VkPhysicalDeviceRayTracingProp
     p->maxTriangleCount = 1u << 26;
     p->maxDescriptorSetAccelerationStructures = device->limits.maxPerStageDescriptorStorageBuffers;
 }
+
+void rtrGetRayTracingPipelineProperties(RtrDevice device, VkPhysicalDeviceRayTracingPipelinePropertiesKHR* p) {
+    (void)device;
+    p->shaderGroupHandleSize = RTC_HANDLE_BYTES;
+    p->maxRayRecursionDepth = 31;
+    p->maxShaderGroupStride = RTC_SBT_MAX_STRIDE;
+    p->shaderGroupBaseAlignment = RTC_SBT_BASE_ALIGNMENT;
+    p->shaderGroupHandleCaptureReplaySize = 0;
+    p->maxRayDispatchInvocationCount = 1u << 31;
+    p->shaderGroupHandleAlignment = RTC_SBT_HANDLE_ALIGNMENT;
+    p->maxRayHitAttributeSize = 32;
+}
+
+void rtrGetAccelerationStructureProperties(RtrDevice device,
+                                           VkPhysicalDeviceAccelerationStructurePropertiesKHR* p) {
+    p->maxGeometryCount = RTC_SLOT_GEOMETRY_MASK;
+    p->maxInstanceCount = 1u << 24;
+    p->maxPrimitiveCount = 1u << 26;
+    p->maxPerStageDescriptorAccelerationStructures =
+        p->maxPerStageDescriptorUpdateAfterBindAccelerationStructures =
+            device->limits.maxPerStageDescriptorStorageBuffers;
+    p->maxDescriptorSetAccelerationStructures =
+        p->maxDescriptorSetUpdateAfterBindAccelerationStructures =
+            device->limits.maxDescriptorSetStorageBuffers;
+    p->minAccelerationStructureScratchOffsetAlignment = 256;
+}

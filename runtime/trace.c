@@ -524,6 +524,14 @@ static VkResult trace(RtrRecorder r, const RtrStridedBufferRegion* raygen, const
     if (!r->pipeline)
         return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "no-pipeline",
                          "rtrCmdTraceRays: no pipeline is bound");
+    if (!r->pipeline->pipeline)
+        return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "not-compiled",
+                         "rtrCmdTraceRays: the pipeline was created with DEFER_COMPILE; rtrCompileDeferred "
+                         "first");
+    if (r->stack_size && r->stack_size < 4ull * r->pipeline->header.stack_words)
+        return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "stack-size",
+                         "rtrCmdSetRayTracingPipelineStackSize said %u bytes; the pipeline's stack has %u",
+                         r->stack_size, 4 * r->pipeline->header.stack_words);
     memset(&l, 0, sizeof l);
     l.r = r;
     l.p = r->pipeline;

@@ -51,3 +51,74 @@ VkDescriptorType rtrTranslateDescriptorType(VkDescriptorType type) {
         return VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
     return type;
 }
+
+VkPipelineStageFlags2 rtrTranslatePipelineStages2(VkPipelineStageFlags2 stages) {
+    const VkPipelineStageFlags2 build = VK_PIPELINE_STAGE_2_ACCELERATION_STRUCTURE_BUILD_BIT_KHR |
+                                        VK_PIPELINE_STAGE_2_ACCELERATION_STRUCTURE_COPY_BIT_KHR;
+    if (stages & VK_PIPELINE_STAGE_2_RAY_TRACING_SHADER_BIT_KHR) {
+        stages &= ~VK_PIPELINE_STAGE_2_RAY_TRACING_SHADER_BIT_KHR;
+        stages |= VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT;
+    }
+    if (stages & build) {
+        stages &= ~build;
+        stages |= VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT;
+    }
+    return stages;
+}
+
+VkAccessFlags2 rtrTranslateAccess2(VkAccessFlags2 access) {
+    if (access & (VK_ACCESS_2_ACCELERATION_STRUCTURE_READ_BIT_KHR | VK_ACCESS_2_SHADER_BINDING_TABLE_READ_BIT_KHR)) {
+        access &= ~(VK_ACCESS_2_ACCELERATION_STRUCTURE_READ_BIT_KHR | VK_ACCESS_2_SHADER_BINDING_TABLE_READ_BIT_KHR);
+        access |= VK_ACCESS_2_SHADER_READ_BIT;
+    }
+    if (access & VK_ACCESS_2_ACCELERATION_STRUCTURE_WRITE_BIT_KHR) {
+        access &= ~VK_ACCESS_2_ACCELERATION_STRUCTURE_WRITE_BIT_KHR;
+        access |= VK_ACCESS_2_SHADER_WRITE_BIT | VK_ACCESS_2_SHADER_READ_BIT;
+    }
+    return access;
+}
+
+VkPipelineBindPoint rtrTranslateBindPoint(VkPipelineBindPoint point) {
+    return point == VK_PIPELINE_BIND_POINT_RAY_TRACING_NV ? VK_PIPELINE_BIND_POINT_COMPUTE : point;
+}
+
+void rtrTranslatePoolSizes(uint32_t count, const VkDescriptorPoolSize* in, VkDescriptorPoolSize* out) {
+    uint32_t i;
+    for (i = 0; i < count; i++) {
+        out[i].type = rtrTranslateDescriptorType(in[i].type);
+        out[i].descriptorCount = in[i].descriptorCount;
+    }
+}
+
+void rtrTranslateLayoutBindings(uint32_t count, const VkDescriptorSetLayoutBinding* in,
+                                VkDescriptorSetLayoutBinding* out) {
+    uint32_t i;
+    for (i = 0; i < count; i++) {
+        out[i] = in[i];
+        out[i].descriptorType = rtrTranslateDescriptorType(in[i].descriptorType);
+        out[i].stageFlags = rtrTranslateShaderStages(in[i].stageFlags);
+    }
+}
+
+uint32_t rtrTranslatePushConstantRanges(uint32_t count, const VkPushConstantRange* in,
+                                        VkPushConstantRange* out) {
+    /* Two ranges of one layout must not name the same stage, so those of all ray tracing
+     * stages and of compute become one. */
+    uint32_t i, kept = 0, begin = 0xffffffffu, end = 0;
+    for (i = 0; i < count; i++) {
+        VkPushConstantRange range = in[i];
+        range.stageFlags = rtrTranslateShaderStages(range.stageFlags);
+        if (range.stageFlags & VK_SHADER_STAGE_COMPUTE_BIT) {
+            if (range.offset < begin) begin = range.offset;
+            if (range.offset + range.size > end) end = range.offset + range.size;
+            range.stageFlags &= ~(VkShaderStageFlags)VK_SHADER_STAGE_COMPUTE_BIT;
+        }
+        if (range.stageFlags) out[kept++] = range;
+    }
+    if (end) {
+        out[kept].stageFlags = VK_SHADER_STAGE_COMPUTE_BIT;
+        out[kept].offset = begin;
+        out[kept++].size = end - begin;
+    }
+    return kept;
+}

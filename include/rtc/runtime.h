@@ -168,6 +168,17 @@ RTR_API const RtrPhysicalDeviceSupport* rtrGetDeviceSupport(RtrDevice device);
  * Counterpart: vkGetPhysicalDeviceProperties2. */
 RTR_API void rtrGetRayTracingProperties(RtrDevice device,
                                         VkPhysicalDeviceRayTracingPropertiesNV* pProperties);
+/* The same for the structures of VK_KHR_ray_tracing_pipeline and
+ * VK_KHR_acceleration_structure. */
+RTR_API void rtrGetRayTracingPipelineProperties(RtrDevice device,
+                                                VkPhysicalDeviceRayTracingPipelinePropertiesKHR* pProperties);
+RTR_API void rtrGetAccelerationStructureProperties(
+    RtrDevice device, VkPhysicalDeviceAccelerationStructurePropertiesKHR* pProperties);
+
+/* Sends a message to the device's messenger, for code that sits on top of the runtime.
+ * severity: ERROR or WARNING; id: a stable name. */
+RTR_API void rtrReportMessage(RtrDevice device, VkDebugUtilsMessageSeverityFlagBitsEXT severity,
+                              const char* id, const char* text);
 
 /* ---- Enums of the extension, turned into valid Vulkan 1.1 ones --------------------
  * Without VK_NV_ray_tracing its enums must not reach vkCreateBuffer and friends. Each
@@ -180,8 +191,24 @@ RTR_API VkPipelineStageFlags rtrTranslatePipelineStages(VkPipelineStageFlags sta
 RTR_API VkAccessFlags rtrTranslateAccess(VkAccessFlags access);
 /* any ray tracing stage -> COMPUTE_BIT */
 RTR_API VkShaderStageFlags rtrTranslateShaderStages(VkShaderStageFlags stages);
-/* ACCELERATION_STRUCTURE_NV -> STORAGE_BUFFER */
+/* ACCELERATION_STRUCTURE_NV/KHR -> STORAGE_BUFFER */
 RTR_API VkDescriptorType rtrTranslateDescriptorType(VkDescriptorType type);
+/* RAY_TRACING -> COMPUTE */
+RTR_API VkPipelineBindPoint rtrTranslateBindPoint(VkPipelineBindPoint bindPoint);
+/* The same for VK_KHR_synchronization2 (also AS copy, and SBT reads) */
+RTR_API VkPipelineStageFlags2 rtrTranslatePipelineStages2(VkPipelineStageFlags2 stages);
+RTR_API VkAccessFlags2 rtrTranslateAccess2(VkAccessFlags2 access);
+/* Arrays of structures: `count` elements of pIn with their types and stages translated.
+ * pOut may be pIn. A pool may name one type several times. */
+RTR_API void rtrTranslatePoolSizes(uint32_t count, const VkDescriptorPoolSize* pIn,
+                                   VkDescriptorPoolSize* pOut);
+RTR_API void rtrTranslateLayoutBindings(uint32_t count, const VkDescriptorSetLayoutBinding* pIn,
+                                        VkDescriptorSetLayoutBinding* pOut);
+/* All ray tracing stages are one stage now, and a layout has one range a stage: theirs and
+ * compute's become one range that covers them. Returns the number of ranges in pOut, which
+ * must have room for count + 1 and must not be pIn. */
+RTR_API uint32_t rtrTranslatePushConstantRanges(uint32_t count, const VkPushConstantRange* pIn,
+                                                VkPushConstantRange* pOut);
 
 /* ---- Heap ------------------------------------------------------------------------- */
 
@@ -197,7 +224,7 @@ RTR_API VkDescriptorType rtrTranslateDescriptorType(VkDescriptorType type);
 /* Buffer usages of build and update scratch. */
 #define RTR_SCRATCH_BUFFER_USAGE (VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT)
 /* Vertex, index, transform, AABB and instance buffers, and SBT buffers. Indices and vertex
- * components of 16 bits are read by whole words: pad such a buffer to a multiple of 4 bytes. */
+ * components of 8 and 16 bits are read by whole words: pad such a buffer to a multiple of 4 bytes. */
 #define RTR_INPUT_BUFFER_USAGE VK_BUFFER_USAGE_STORAGE_BUFFER_BIT
 /* Buffer usages of a recorder's control region. */
 #define RTR_CONTROL_BUFFER_USAGE                                               \
@@ -241,7 +268,7 @@ RTR_API void rtrFreeHeapRange(RtrHeap heap, VkDeviceSize offset);
  * structures are copied; buffers named in them are only used by the build.
  * Limits: 2^26 primitives, 2^24 instances, 2^24-1 geometries; vertex formats
  * R32G32B32 and R32G32 SFLOAT, R16G16B16 and R16G16 SFLOAT and SNORM (also with an
- * alpha that is ignored; a missing z is 0); index types NONE_NV, UINT16, UINT32. One
+ * alpha that is ignored; a missing z is 0); index types NONE_NV, UINT8_EXT, UINT16, UINT32. One
  * kind of geometry per bottom level.
  * Errors: VALIDATION_FAILED for counts, formats, mixed geometry types, unknown pNext. */
 RTR_API VkResult rtrCreateAccelerationStructure(RtrDevice device,
@@ -293,6 +320,13 @@ RTR_API VkResult rtrGetAccelerationStructureDescriptor(RtrDevice device,
                                                        VkDescriptorBufferInfo* pInfo);
 RTR_API VkResult rtrGetNullAccelerationStructureDescriptor(RtrDevice device, RtrHeap heap,
                                                            VkDescriptorBufferInfo* pInfo);
+/* Writes `count` structures into array elements from dstArrayElement on of such a
+ * descriptor. The null structure of `nullHeap` stands for NULL ones (nullHeap may be NULL
+ * when there are none). Counterpart: vkUpdateDescriptorSets with
+ * VkWriteDescriptorSetAccelerationStructureNV. */
+RTR_API VkResult rtrUpdateAccelerationStructureDescriptors(
+    RtrDevice device, VkDescriptorSet dstSet, uint32_t dstBinding, uint32_t dstArrayElement, uint32_t count,
+    const RtrAccelerationStructure* pAccelerationStructures, RtrHeap nullHeap);
 
 /* ---- Recorder --------------------------------------------------------------------- */
 
@@ -424,7 +458,7 @@ RTR_API void rtrGetDeviceAccelerationStructureCompatibility(
 
 typedef struct RtrRayTracingPipelineCreateInfo {
     const void* pNext;           /* must be NULL */
-    VkPipelineCreateFlags flags; /* e.g. DISABLE_OPTIMIZATION; no DERIVATIVE */
+    VkPipelineCreateFlags flags; /* e.g. DISABLE_OPTIMIZATION, DEFER_COMPILE_NV; no DERIVATIVE */
     const uint32_t* pCode;       /* a module that rtc linked, with its reflection */
     size_t codeSize;             /* bytes */
     /* The application's set layouts, 0 to setLayoutCount-1. Ray tracing descriptors
@@ -451,6 +485,24 @@ RTR_API VkResult rtrCreateRayTracingPipeline(RtrDevice device, VkPipelineCache p
                                              const VkAllocationCallbacks* pAllocator, RtrPipeline* pPipeline);
 RTR_API void rtrDestroyPipeline(RtrDevice device, RtrPipeline pipeline,
                                 const VkAllocationCallbacks* pAllocator);
+
+/* Compiles a pipeline that was created with VK_PIPELINE_CREATE_DEFER_COMPILE_BIT_NV, with the
+ * pipeline cache given then; until then launches with it are errors. The stages are one
+ * shader, so any `shader` compiles all of it, and later calls do nothing. pAllocator: as
+ * given to the creation. May run in another thread than the creation; not twice at once for
+ * one pipeline. Counterpart: vkCompileDeferredNV. */
+RTR_API VkResult rtrCompileDeferred(RtrDevice device, RtrPipeline pipeline, uint32_t shader,
+                                    const VkAllocationCallbacks* pAllocator);
+
+/* The stack is part of the compiled shader, sized by --max-recursion-depth and
+ * --max-callable-depth: for general groups its bytes a lane (0 when the pipeline needs none),
+ * 0 for hit groups. Counterpart: vkGetRayTracingShaderGroupStackSizeKHR. */
+RTR_API VkDeviceSize rtrGetRayTracingShaderGroupStackSize(RtrDevice device, RtrPipeline pipeline,
+                                                          uint32_t group,
+                                                          VkShaderGroupShaderKHR groupShader);
+/* Remembered until the next begin; launches of pipelines whose stack is larger are then
+ * errors. Nothing needs it. Counterpart: vkCmdSetRayTracingPipelineStackSizeKHR. */
+RTR_API VkResult rtrCmdSetRayTracingPipelineStackSize(RtrRecorder recorder, uint32_t pipelineStackSize);
 
 /* dataSize >= groupCount * 32. Counterpart: vkGetRayTracingShaderGroupHandlesNV. */
 RTR_API VkResult rtrGetRayTracingShaderGroupHandles(RtrDevice device, RtrPipeline pipeline,

@@ -65,6 +65,7 @@
 #define RTR_INDEX_NONE 0u
 #define RTR_INDEX_16 1u
 #define RTR_INDEX_32 2u
+#define RTR_INDEX_8 3u
 
 /* Two or three components; a missing z is 0. */
 #define RTR_VERTEX_FLOAT3 0u

@@ -4,6 +4,10 @@
 uint read_index(uint i) {
     if (p.index_type == RTR_INDEX_NONE) return i;
     if (p.index_type == RTR_INDEX_32) return in_index[(p.index_offset >> 2) + i];
+    if (p.index_type == RTR_INDEX_8) {
+        uint at = p.index_offset + i;
+        return (in_index[at >> 2] >> (8u * (at & 3u))) & 0xffu;
+    }
     uint byte = p.index_offset + 2u * i;
     return (in_index[byte >> 2] >> (8u * (byte & 2u))) & 0xffffu;
 }

@@ -3,70 +3,18 @@
 #include <cmath>
 #include <random>
 
+#include "launch_fixture.h"
 #include "module_util.h"
 #include "scene_util.h"
 #include "spv/module_trace_address.h"
 
 namespace {
 
-class AddressTest : public RuntimeTest {
+class AddressTest : public LaunchTest {
   protected:
     void SetUp() override {
         RuntimeTest::SetUp();
         if (vk && !vk->GetBufferDeviceAddress) GTEST_SKIP() << "the device has no bufferDeviceAddress";
-    }
-    void TearDown() override {
-        if (vk) {
-            rtrDestroyPipeline(rtr, pipeline, nullptr);
-            if (pool) vk->DestroyDescriptorPool(vk->device, pool, nullptr);
-            if (layout) vk->DestroyDescriptorSetLayout(vk->device, layout, nullptr);
-        }
-        RuntimeTest::TearDown();
-    }
-
-    void make_set(const std::vector<VkDescriptorBufferInfo>& buffers) {
-        std::vector<VkDescriptorSetLayoutBinding> bindings;
-        for (uint32_t i = 0; i < buffers.size(); i++)
-            bindings.push_back(
-                {i, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr});
-        VkDescriptorSetLayoutCreateInfo info{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO};
-        info.bindingCount = static_cast<uint32_t>(bindings.size());
-        info.pBindings = bindings.data();
-        vk->CreateDescriptorSetLayout(vk->device, &info, nullptr, &layout);
-        VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, info.bindingCount};
-        VkDescriptorPoolCreateInfo pool_info{VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO};
-        pool_info.maxSets = 1;
-        pool_info.poolSizeCount = 1;
-        pool_info.pPoolSizes = &size;
-        vk->CreateDescriptorPool(vk->device, &pool_info, nullptr, &pool);
-        VkDescriptorSetAllocateInfo allocate{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO};
-        allocate.descriptorPool = pool;
-        allocate.descriptorSetCount = 1;
-        allocate.pSetLayouts = &layout;
-        vk->AllocateDescriptorSets(vk->device, &allocate, &set);
-        for (uint32_t i = 0; i < buffers.size(); i++) write(i, buffers[i]);
-    }
-
-    void write(uint32_t binding, const VkDescriptorBufferInfo& info) {
-        VkWriteDescriptorSet w{VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET};
-        w.dstSet = set;
-        w.dstBinding = binding;
-        w.descriptorCount = 1;
-        w.descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
-        w.pBufferInfo = &info;
-        vk->UpdateDescriptorSets(vk->device, 1, &w, 0, nullptr);
-    }
-
-    VkResult make_pipeline(RtrDevice device, const std::vector<uint32_t>& code) {
-        VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, 4};
-        RtrRayTracingPipelineCreateInfo info{};
-        info.pCode = code.data();
-        info.codeSize = code.size() * 4;
-        info.setLayoutCount = layout ? 1 : 0;
-        info.pSetLayouts = &layout;
-        info.pushConstantRangeCount = 1;
-        info.pPushConstantRanges = &range;
-        return rtrCreateRayTracingPipeline(device, VK_NULL_HANDLE, &info, nullptr, &pipeline);
     }
 
     static std::vector<uint32_t> module() {
@@ -74,11 +22,6 @@ class AddressTest : public RuntimeTest {
         h.flags = RTC_MODULE_ADDRESS_MODE;
         return with_reflection(module_trace_address_spv, sizeof module_trace_address_spv, h, "{}");
     }
-
-    VkDescriptorSetLayout layout = VK_NULL_HANDLE;
-    VkDescriptorPool pool = VK_NULL_HANDLE;
-    VkDescriptorSet set = VK_NULL_HANDLE;
-    RtrPipeline pipeline = nullptr;
 };
 
 struct Ray {
@@ -147,8 +90,11 @@ TEST_F(AddressTest, TracesAcrossBuffers) {
     Buffer hits = scene.upload(nullptr, rays.size() * sizeof(Hit));
     VkDescriptorBufferInfo header;
     ASSERT_EQ(rtrGetAccelerationStructureDescriptor(rtr, top, &header), VK_SUCCESS);
-    make_set({header, {ray_buffer.handle, 0, VK_WHOLE_SIZE}, {hits.handle, 0, VK_WHOLE_SIZE}});
-    ASSERT_EQ(make_pipeline(rtr, module()), VK_SUCCESS);
+    make_set(3);
+    write(0, header);
+    write(1, {ray_buffer.handle, 0, VK_WHOLE_SIZE});
+    write(2, {hits.handle, 0, VK_WHOLE_SIZE});
+    ASSERT_EQ(make_pipeline(module(), 4), VK_SUCCESS);
     if (rtrGetDeviceSupport(rtr)->needsResumableModules) expect_runtime_error("not-resumable");
     Buffer sbt = scene.upload(nullptr, 256);
     uint32_t first = 0;
@@ -230,7 +176,7 @@ TEST_F(AddressTest, NeedsTheFeature) {
     info.pMessenger = &messenger;
     RtrDevice plain = nullptr;
     ASSERT_EQ(rtrCreateDevice(&info, nullptr, &plain), VK_SUCCESS);
-    EXPECT_EQ(make_pipeline(plain, module()), VK_ERROR_FEATURE_NOT_PRESENT);
+    EXPECT_EQ(make_pipeline(module(), 4, nullptr, nullptr, plain), VK_ERROR_FEATURE_NOT_PRESENT);
     expect_runtime_error("address-mode");
     VkAccelerationStructureCreateInfoNV create{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_CREATE_INFO_NV};
     create.info.sType = VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV;

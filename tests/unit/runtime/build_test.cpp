@@ -284,16 +284,24 @@ TEST_P(BuildTest, GeometryFields) {
     VkGeometryNV g2 = scene.triangles(points, nullptr, VK_GEOMETRY_NO_DUPLICATE_ANY_HIT_INVOCATION_BIT_NV);
     g2.geometry.triangles.vertexOffset = 36;
     g2.geometry.triangles.vertexCount = 297;
-    auto as = scene.build_bottom({g0, g1, g2}, flags());
+    // Geometry 3: 8-bit indices at an odd byte.
+    std::vector<uint8_t> narrow{77};
+    for (uint32_t i = 0; i < 60; i++) narrow.push_back(static_cast<uint8_t>(255 - 3 * i));
+    VkGeometryNV g3 = scene.triangles(points);
+    g3.geometry.triangles.indexData = scene.upload(narrow.data(), narrow.size()).handle;
+    g3.geometry.triangles.indexType = VK_INDEX_TYPE_UINT8_EXT;
+    g3.geometry.triangles.indexOffset = 1;
+    g3.geometry.triangles.indexCount = 60;
+    auto as = scene.build_bottom({g0, g1, g2, g3}, flags());
     TreeFacts facts;
     check_structure(scene, as, facts);
-    ASSERT_EQ(facts.slots.size(), 100u + 10 + 99);
-    EXPECT_EQ(scene.words(as)[RTC_HDR_GEOMETRY_COUNT], 3u);
+    ASSERT_EQ(facts.slots.size(), 100u + 10 + 99 + 20);
+    EXPECT_EQ(scene.words(as)[RTC_HDR_GEOMETRY_COUNT], 4u);
     EXPECT_EQ(scene.words(as)[RTC_HDR_FACTS], 0u);
-    int seen[3] = {};
+    int seen[4] = {};
     for (auto& s : facts.slots) {
         uint32_t geometry = s.geometry_word & RTC_SLOT_GEOMETRY_MASK;
-        ASSERT_LT(geometry, 3u);
+        ASSERT_LT(geometry, 4u);
         seen[geometry]++;
         for (uint32_t k = 0; k < 3; k++) {
             Vec3 expected{};
@@ -303,6 +311,8 @@ TEST_P(BuildTest, GeometryFields) {
                 expected = {2 * p.y + 10, -p.x + 20, 0.5f * p.z + 30};
             } else if (geometry == 1) {
                 expected = points[(at * 7) % 300];
+            } else if (geometry == 3) {
+                expected = points[255 - 3 * at];
             } else {
                 expected = points[3 + at];
             }
@@ -310,12 +320,13 @@ TEST_P(BuildTest, GeometryFields) {
             EXPECT_EQ(expected.y, s.v[k].y);
             EXPECT_EQ(expected.z, s.v[k].z);
         }
-        const uint32_t flag[] = {0, RTC_SLOT_OPAQUE, RTC_SLOT_NO_DUPLICATE};
+        const uint32_t flag[] = {0, RTC_SLOT_OPAQUE, RTC_SLOT_NO_DUPLICATE, 0};
         EXPECT_EQ(s.geometry_word, geometry | flag[geometry]);
     }
     EXPECT_EQ(seen[0], 100);
     EXPECT_EQ(seen[1], 10);
     EXPECT_EQ(seen[2], 99);
+    EXPECT_EQ(seen[3], 20);
 }
 
 TEST_P(BuildTest, VertexFormats) {

@@ -255,7 +255,7 @@ TEST_P(CopyTest, WrongUsesAreNamed) {
     with([](VkGeometryNV& g) { g.geometry.triangles.vertexStride = 11; }, "vertex-stride");
     with([](VkGeometryNV& g) { g.geometry.triangles.vertexOffset = 2; }, "vertex-offset");
     with([](VkGeometryNV& g) { g.geometry.triangles.vertexCount = 31; }, "vertex-count");
-    with([](VkGeometryNV& g) { g.geometry.triangles.indexType = VK_INDEX_TYPE_UINT8_EXT; }, "index-type");
+    with([](VkGeometryNV& g) { g.geometry.triangles.indexType = VK_INDEX_TYPE_MAX_ENUM; }, "index-type");
     with([](VkGeometryNV& g) { g.pNext = &g; }, "pNext");
     std::vector<VkGeometryNV> mixed{geometry[0], scene.aabbs({{0, 0, 0, 1, 1, 1}})};
     create.info.geometryCount = 2;

@@ -242,6 +242,127 @@ TEST_F(LifetimeTest, EnumsBecomeValidOnes) {
     EXPECT_EQ(rtrTranslateDescriptorType(VK_DESCRIPTOR_TYPE_ACCELERATION_STRUCTURE_NV),
               VK_DESCRIPTOR_TYPE_STORAGE_BUFFER);
     EXPECT_EQ(rtrTranslateDescriptorType(VK_DESCRIPTOR_TYPE_SAMPLER), VK_DESCRIPTOR_TYPE_SAMPLER);
+    EXPECT_EQ(rtrTranslateBindPoint(VK_PIPELINE_BIND_POINT_RAY_TRACING_NV), VK_PIPELINE_BIND_POINT_COMPUTE);
+    EXPECT_EQ(rtrTranslateBindPoint(VK_PIPELINE_BIND_POINT_GRAPHICS), VK_PIPELINE_BIND_POINT_GRAPHICS);
+    EXPECT_EQ(rtrTranslatePipelineStages2(VK_PIPELINE_STAGE_2_RAY_TRACING_SHADER_BIT_KHR |
+                                          VK_PIPELINE_STAGE_2_HOST_BIT),
+              VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_2_HOST_BIT);
+    EXPECT_EQ(rtrTranslatePipelineStages2(VK_PIPELINE_STAGE_2_ACCELERATION_STRUCTURE_COPY_BIT_KHR),
+              VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT);
+    EXPECT_EQ(rtrTranslateAccess2(VK_ACCESS_2_SHADER_BINDING_TABLE_READ_BIT_KHR | VK_ACCESS_2_HOST_READ_BIT),
+              VK_ACCESS_2_SHADER_READ_BIT | VK_ACCESS_2_HOST_READ_BIT);
+    EXPECT_EQ(rtrTranslateAccess2(VK_ACCESS_2_ACCELERATION_STRUCTURE_WRITE_BIT_KHR),
+              VK_ACCESS_2_SHADER_READ_BIT | VK_ACCESS_2_SHADER_WRITE_BIT);
+}
+
+TEST_F(LifetimeTest, ArraysOfStructuresBecomeValidOnes) {
+    VkDescriptorPoolSize sizes[2] = {{VK_DESCRIPTOR_TYPE_ACCELERATION_STRUCTURE_NV, 3},
+                                     {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, 4}};
+    rtrTranslatePoolSizes(2, sizes, sizes);
+    EXPECT_EQ(sizes[0].type, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER);
+    EXPECT_EQ(sizes[0].descriptorCount, 3u);
+    EXPECT_EQ(sizes[1].type, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE);
+    VkDescriptorSetLayoutBinding bindings[2] = {
+        {7, VK_DESCRIPTOR_TYPE_ACCELERATION_STRUCTURE_KHR, 2,
+         VK_SHADER_STAGE_RAYGEN_BIT_NV | VK_SHADER_STAGE_FRAGMENT_BIT, nullptr},
+        {8, VK_DESCRIPTOR_TYPE_SAMPLER, 1, VK_SHADER_STAGE_MISS_BIT_NV, nullptr}};
+    rtrTranslateLayoutBindings(2, bindings, bindings);
+    EXPECT_EQ(bindings[0].binding, 7u);
+    EXPECT_EQ(bindings[0].descriptorCount, 2u);
+    EXPECT_EQ(bindings[0].descriptorType, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER);
+    EXPECT_EQ(bindings[0].stageFlags,
+              VkShaderStageFlags(VK_SHADER_STAGE_COMPUTE_BIT | VK_SHADER_STAGE_FRAGMENT_BIT));
+    EXPECT_EQ(bindings[1].stageFlags, VkShaderStageFlags(VK_SHADER_STAGE_COMPUTE_BIT));
+    const VkPushConstantRange in[3] = {{VK_SHADER_STAGE_CLOSEST_HIT_BIT_NV, 16, 8},
+                                       {VK_SHADER_STAGE_RAYGEN_BIT_NV | VK_SHADER_STAGE_VERTEX_BIT, 4, 4},
+                                       {VK_SHADER_STAGE_FRAGMENT_BIT, 0, 64}};
+    VkPushConstantRange out[4];
+    ASSERT_EQ(rtrTranslatePushConstantRanges(3, in, out), 3u);
+    EXPECT_EQ(out[0].stageFlags, VkShaderStageFlags(VK_SHADER_STAGE_VERTEX_BIT));
+    EXPECT_EQ(out[0].offset, 4u);
+    EXPECT_EQ(out[1].stageFlags, VkShaderStageFlags(VK_SHADER_STAGE_FRAGMENT_BIT));
+    EXPECT_EQ(out[2].stageFlags, VkShaderStageFlags(VK_SHADER_STAGE_COMPUTE_BIT));
+    EXPECT_EQ(out[2].offset, 4u);
+    EXPECT_EQ(out[2].size, 20u);
+    EXPECT_EQ(rtrTranslatePushConstantRanges(0, nullptr, out), 0u);
+}
+
+TEST_F(LifetimeTest, KhrPropertiesAgree) {
+    VkPhysicalDeviceRayTracingPropertiesNV nv{
+        VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_TRACING_PROPERTIES_NV};
+    VkPhysicalDeviceRayTracingPipelinePropertiesKHR p{
+        VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_TRACING_PIPELINE_PROPERTIES_KHR};
+    VkPhysicalDeviceAccelerationStructurePropertiesKHR a{
+        VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ACCELERATION_STRUCTURE_PROPERTIES_KHR};
+    p.pNext = &a;
+    rtrGetRayTracingProperties(rtr, &nv);
+    rtrGetRayTracingPipelineProperties(rtr, &p);
+    rtrGetAccelerationStructureProperties(rtr, &a);
+    EXPECT_EQ(p.pNext, &a);
+    EXPECT_EQ(p.shaderGroupHandleSize, nv.shaderGroupHandleSize);
+    EXPECT_EQ(p.maxRayRecursionDepth, nv.maxRecursionDepth);
+    EXPECT_EQ(p.maxShaderGroupStride, nv.maxShaderGroupStride);
+    EXPECT_EQ(p.shaderGroupBaseAlignment, nv.shaderGroupBaseAlignment);
+    EXPECT_EQ(p.shaderGroupHandleAlignment, 32u);
+    EXPECT_EQ(a.maxGeometryCount, nv.maxGeometryCount);
+    EXPECT_EQ(a.maxInstanceCount, nv.maxInstanceCount);
+    EXPECT_EQ(a.maxPrimitiveCount, nv.maxTriangleCount);
+    EXPECT_GT(a.maxPerStageDescriptorAccelerationStructures, 0u);
+    EXPECT_EQ(a.minAccelerationStructureScratchOffsetAlignment, 256u);
+}
+
+// Extending structures are never skipped in silence: the message names their type.
+TEST_F(LifetimeTest, UnknownChainsAreNamed) {
+    VkMemoryAllocateInfo stranger{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO};
+    auto expect = [&](VkResult result, const char* owner) {
+        EXPECT_EQ(result, VK_ERROR_VALIDATION_FAILED_EXT);
+        ASSERT_EQ(vk->runtime_messages.size(), 1u);
+        EXPECT_NE(vk->runtime_messages[0].find(owner), std::string::npos) << vk->runtime_messages[0];
+        EXPECT_NE(vk->runtime_messages[0].find(std::to_string(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO)),
+                  std::string::npos)
+            << vk->runtime_messages[0];
+        expect_runtime_error("pNext");
+    };
+    RtrHeapCreateInfo heap_info{};
+    heap_info.pNext = &stranger;
+    RtrHeap heap = nullptr;
+    expect(rtrCreateHeap(rtr, &heap_info, nullptr, &heap), "RtrHeapCreateInfo");
+    RtrRecorderCreateInfo recorder_info{};
+    recorder_info.pNext = &stranger;
+    RtrRecorder recorder = nullptr;
+    expect(rtrCreateRecorder(rtr, &recorder_info, nullptr, &recorder), "RtrRecorderCreateInfo");
+    RtrRayTracingPipelineCreateInfo pipeline_info{};
+    pipeline_info.pNext = &stranger;
+    RtrPipeline pipeline = nullptr;
+    expect(rtrCreateRayTracingPipeline(rtr, VK_NULL_HANDLE, &pipeline_info, nullptr, &pipeline),
+           "RtrRayTracingPipelineCreateInfo");
+    VkAccelerationStructureCreateInfoNV create{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_CREATE_INFO_NV};
+    create.info.sType = VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV;
+    create.info.type = VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_NV;
+    RtrAccelerationStructure as = nullptr;
+    create.pNext = &stranger;
+    expect(rtrCreateAccelerationStructure(rtr, &create, nullptr, &as), "VkAccelerationStructureCreateInfoNV");
+    create.pNext = nullptr;
+    create.info.pNext = &stranger;
+    expect(rtrCreateAccelerationStructure(rtr, &create, nullptr, &as), "VkAccelerationStructureInfoNV");
+    create.info.pNext = nullptr;
+    VkGeometryNV geometry{VK_STRUCTURE_TYPE_GEOMETRY_NV};
+    create.info.geometryCount = 1;
+    create.info.pGeometries = &geometry;
+    geometry.geometryType = VK_GEOMETRY_TYPE_TRIANGLES_NV;
+    geometry.geometry.triangles.pNext = &stranger;
+    expect(rtrCreateAccelerationStructure(rtr, &create, nullptr, &as), "VkGeometryTrianglesNV");
+    geometry.geometryType = VK_GEOMETRY_TYPE_AABBS_NV;
+    geometry.geometry.aabbs.pNext = &stranger;
+    expect(rtrCreateAccelerationStructure(rtr, &create, nullptr, &as), "VkGeometryAABBNV");
+    geometry.pNext = &stranger;
+    expect(rtrCreateAccelerationStructure(rtr, &create, nullptr, &as), "VkGeometryNV");
+    RtrBindAccelerationStructureMemoryInfo bind{};
+    bind.pNext = &stranger;
+    expect(rtrBindAccelerationStructureMemory(rtr, 1, &bind), "RtrBindAccelerationStructureMemoryInfo");
+    rtrReportMessage(rtr, VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT, "mine", "100 %s");
+    EXPECT_EQ(vk->runtime_messages[0], "mine: 100 %s");
+    vk->runtime_messages.clear();
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "launch_fixture.h"
 #include "module_util.h"
 #include "scene_util.h"
 #include "spv/module_resume.h"
@@ -17,71 +18,7 @@ constexpr uint32_t kAllUsed = 1u << RTC_BINDING_PARAMS | 1u << RTC_BINDING_HEAP_
                               1u << RTC_BINDING_SBT_HIT | 1u << RTC_BINDING_CONTROL |
                               1u << RTC_BINDING_SCRATCH;
 
-class TraceTest : public RuntimeTest {
-  protected:
-    void TearDown() override {
-        if (vk) {
-            rtrDestroyPipeline(rtr, pipeline, nullptr);
-            if (pool) vk->DestroyDescriptorPool(vk->device, pool, nullptr);
-            if (layout) vk->DestroyDescriptorSetLayout(vk->device, layout, nullptr);
-        }
-        RuntimeTest::TearDown();
-    }
-
-    void make_set(uint32_t storage_buffers, std::vector<VkDescriptorSetLayoutBinding> more = {}) {
-        for (uint32_t i = 0; i < storage_buffers; i++) {
-            more.push_back({i, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr});
-        }
-        VkDescriptorSetLayoutCreateInfo info{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO};
-        info.bindingCount = static_cast<uint32_t>(more.size());
-        info.pBindings = more.data();
-        ASSERT_EQ(vk->CreateDescriptorSetLayout(vk->device, &info, nullptr, &layout), VK_SUCCESS);
-        VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 20},
-                                        {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER_DYNAMIC, 1},
-                                        {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, 1}};
-        VkDescriptorPoolCreateInfo pool_info{VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO};
-        pool_info.maxSets = 1;
-        pool_info.poolSizeCount = 3;
-        pool_info.pPoolSizes = sizes;
-        vk->CreateDescriptorPool(vk->device, &pool_info, nullptr, &pool);
-        VkDescriptorSetAllocateInfo allocate{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO};
-        allocate.descriptorPool = pool;
-        allocate.descriptorSetCount = 1;
-        allocate.pSetLayouts = &layout;
-        ASSERT_EQ(vk->AllocateDescriptorSets(vk->device, &allocate, &set), VK_SUCCESS);
-    }
-
-    void write(uint32_t binding, VkDescriptorBufferInfo info) {
-        VkWriteDescriptorSet w{VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET};
-        w.dstSet = set;
-        w.dstBinding = binding;
-        w.descriptorCount = 1;
-        w.descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
-        w.pBufferInfo = &info;
-        vk->UpdateDescriptorSets(vk->device, 1, &w, 0, nullptr);
-    }
-
-    VkResult make_pipeline(const std::vector<uint32_t>& code, uint32_t push_bytes,
-                           const RtrTraceOptions* options = nullptr,
-                           const VkSpecializationInfo* specialization = nullptr) {
-        VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, push_bytes};
-        RtrRayTracingPipelineCreateInfo info{};
-        info.pCode = code.data();
-        info.codeSize = code.size() * 4;
-        info.setLayoutCount = 1;
-        info.pSetLayouts = &layout;
-        info.pushConstantRangeCount = 1;
-        info.pPushConstantRanges = &range;
-        info.pOptions = options;
-        info.pSpecializationInfo = specialization;
-        return rtrCreateRayTracingPipeline(rtr, VK_NULL_HANDLE, &info, nullptr, &pipeline);
-    }
-
-    VkDescriptorSetLayout layout = VK_NULL_HANDLE;
-    VkDescriptorPool pool = VK_NULL_HANDLE;
-    VkDescriptorSet set = VK_NULL_HANDLE;
-    RtrPipeline pipeline = nullptr;
-};
+class TraceTest : public LaunchTest {};
 
 struct Ray {
     float o[3], tmin, d[3], tmax;
@@ -230,7 +167,12 @@ TEST_F(TraceTest, NullStructureMisses) {
     make_set(3);
     VkDescriptorBufferInfo header;
     ASSERT_EQ(rtrGetNullAccelerationStructureDescriptor(rtr, scene.heap, &header), VK_SUCCESS);
-    write(0, header);
+    EXPECT_EQ(header.buffer, scene.heap_buffer.handle);
+    RtrAccelerationStructure none = nullptr;
+    EXPECT_EQ(rtrUpdateAccelerationStructureDescriptors(rtr, set, 0, 0, 1, &none, nullptr),
+              VK_ERROR_VALIDATION_FAILED_EXT);
+    expect_runtime_error("not-bound");
+    EXPECT_EQ(rtrUpdateAccelerationStructureDescriptors(rtr, set, 0, 0, 1, &none, scene.heap), VK_SUCCESS);
     write(1, {rays.handle, 0, VK_WHOLE_SIZE});
     write(2, {hits.handle, 0, VK_WHOLE_SIZE});
     ASSERT_EQ(
@@ -253,6 +195,85 @@ TEST_F(TraceTest, NullStructureMisses) {
                   VK_SUCCESS);
     });
     EXPECT_EQ(hits.as<Hit>()->t, 0xffffffffu);
+}
+
+// More elements than one call writes at once: the last one is a structure, the rest are null.
+TEST_F(TraceTest, ArraysOfStructures) {
+    Scene scene(*vk, rtr, 1 << 16);
+    auto as = scene.build_bottom({scene.triangles({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}})});
+    make_set(1, {{1, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 90, VK_SHADER_STAGE_COMPUTE_BIT, nullptr}});
+    std::vector<RtrAccelerationStructure> all(90, nullptr);
+    all[89] = as;
+    EXPECT_EQ(rtrUpdateAccelerationStructureDescriptors(rtr, set, 1, 0, 90, all.data(), scene.heap),
+              VK_SUCCESS);
+    VkAccelerationStructureCreateInfoNV create{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_CREATE_INFO_NV};
+    create.info.sType = VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV;
+    RtrAccelerationStructure unbound = nullptr;
+    ASSERT_EQ(rtrCreateAccelerationStructure(rtr, &create, nullptr, &unbound), VK_SUCCESS);
+    all[3] = unbound;
+    EXPECT_EQ(rtrUpdateAccelerationStructureDescriptors(rtr, set, 1, 0, 90, all.data(), scene.heap),
+              VK_ERROR_VALIDATION_FAILED_EXT);
+    expect_runtime_error("not-bound");
+    rtrDestroyAccelerationStructure(rtr, unbound, nullptr);
+}
+
+TEST_F(TraceTest, DeferredCompilation) {
+    Scene scene(*vk, rtr, 1 << 16);
+    Buffer result = scene.upload(nullptr, 4096), sbt = scene.upload(nullptr, 4096),
+           scratch = scene.upload(nullptr, 1 << 16);
+    memset(result.data, 0, result.size);
+    RtcModuleHeader h = module_header(kAllUsed, 2);
+    h.flags = RTC_MODULE_RESUMABLE;
+    h.scratch_words = 1;
+    h.stack_words = 5;
+    make_set(1);
+    write(0, {result.handle, 0, VK_WHOLE_SIZE});
+    uint32_t app_constant = 3;
+    VkSpecializationMapEntry entry{7, 0, 4};
+    VkSpecializationInfo specialization{1, &entry, 4, &app_constant};
+    {
+        // Nothing of the application's is used after the creation.
+        auto code = with_reflection(module_resume_spv, sizeof module_resume_spv, h, "{}");
+        ASSERT_EQ(make_pipeline(code, 8, nullptr, &specialization, nullptr,
+                                VK_PIPELINE_CREATE_DEFER_COMPILE_BIT_NV),
+                  VK_SUCCESS);
+        std::fill(code.begin(), code.end(), 0u);
+        app_constant = 0;
+        specialization = {};
+    }
+    EXPECT_EQ(rtrGetRayTracingShaderGroupStackSize(rtr, pipeline, 0, VK_SHADER_GROUP_SHADER_GENERAL_KHR), 20u);
+    EXPECT_EQ(rtrGetRayTracingShaderGroupStackSize(rtr, pipeline, 1, VK_SHADER_GROUP_SHADER_CLOSEST_HIT_KHR),
+              0u);
+    EXPECT_EQ(rtrGetRayTracingShaderGroupStackSize(rtr, pipeline, 2, VK_SHADER_GROUP_SHADER_GENERAL_KHR), 0u);
+    auto trace = [&] {
+        return rtrCmdTraceRays(scene.recorder, sbt.handle, 0, VK_NULL_HANDLE, 0, 0, sbt.handle, 0, 64,
+                               VK_NULL_HANDLE, 0, 0, 5, 1, 1);
+    };
+    auto record = [&] {
+        rtrCmdBindPipeline(scene.recorder, pipeline);
+        rtrCmdBindDescriptorSets(scene.recorder, 0, 1, &set, 0, nullptr);
+        uint32_t push[2] = {3, 0};
+        rtrCmdPushConstants(scene.recorder, 0, 8, push);
+        rtrCmdSetHeap(scene.recorder, scene.heap);
+        rtrCmdSetLaunchScratch(scene.recorder, scratch.handle, 0, scratch.size);
+    };
+    EXPECT_EQ(rtrCmdSetRayTracingPipelineStackSize(scene.recorder, 20), VK_SUCCESS);
+    scene.run([&] {
+        record();
+        EXPECT_EQ(trace(), VK_ERROR_VALIDATION_FAILED_EXT);
+        expect_runtime_error("not-compiled");
+    });
+    ASSERT_EQ(rtrCompileDeferred(rtr, pipeline, 0, nullptr), VK_SUCCESS);
+    EXPECT_EQ(rtrCompileDeferred(rtr, pipeline, 1, nullptr), VK_SUCCESS);
+    scene.run([&] {
+        record();
+        EXPECT_EQ(rtrCmdSetRayTracingPipelineStackSize(scene.recorder, 19), VK_SUCCESS);
+        EXPECT_EQ(trace(), VK_ERROR_VALIDATION_FAILED_EXT);
+        expect_runtime_error("stack-size");
+        EXPECT_EQ(rtrCmdSetRayTracingPipelineStackSize(scene.recorder, 20), VK_SUCCESS);
+        EXPECT_EQ(trace(), VK_SUCCESS);
+    });
+    EXPECT_NE(result.as<uint32_t>()[0], 0u);
 }
 
 class ResumeTest : public TraceTest {
