@@ -23,7 +23,7 @@ for source in sorted((root / "compiler").rglob("*.cpp")):
 RUNTIME = re.compile(r'''\b(?:rtr_\w*error|rtr_warn\w*|bad|report|reject|check_limit)\((?:[^()"]|\([^()]*\))*?
                          "([a-zA-Z][A-Za-z0-9]*(?:-[a-z0-9]+)*)",''', re.VERBOSE)
 runtime = set()
-for source in sorted((root / "runtime").glob("*.c")):
+for source in [*sorted((root / "runtime").glob("*.c")), root / "include/rtc/runtime_compiler.h"]:
     text = source.read_text()
     runtime |= set(RUNTIME.findall(text))
     calls = len(re.findall(r"\brtr_error\(\w[^;]*?VK_ERROR", text))

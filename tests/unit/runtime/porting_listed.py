@@ -47,7 +47,7 @@ bad += [f"a row says unsupported: {row}" for row in rows if re.search(r"unsuppor
 nv_rows = [row for title in ("## Functions", "## What the extension adds", "## Structures", "## Enums and flags")
            for row in chapter(title).splitlines() if row.startswith("| `")]
 bad += [f"no test: {row}" for row in nv_rows if "](" not in row.split("|")[3]]
-ours = "".join((root / f"include/rtc/{h}.h").read_text() for h in ("runtime", "compiler"))
+ours = "".join((root / f"include/rtc/{h}.h").read_text() for h in ("runtime", "compiler", "runtime_compiler"))
 bad += [f"{n}: not in our headers" for n in sorted(set(re.findall(r"`((?:rtr|Rtr|RTR_|rtcc_)\w+)(?!\w|…)", text)))
         if not re.search(rf"\b{n}\b", ours)]
 for label, link in re.findall(r"\[([^\]]+)\]\(([^)#]+)\)", text):
