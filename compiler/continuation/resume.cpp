@@ -37,29 +37,33 @@ std::vector<Id> Machine::carried_variables(const std::vector<Function>& stage_fu
     // A pending candidate, read by any-hit and intersection shaders.
     for (const auto& [name, id] : exports_)
         if (name.rfind("rtc_cand_", 0) == 0) candidates.push_back(id);
-    const std::set<Id> candidate_set(candidates.begin(), candidates.end());
+    ir::IdSet candidate_set;
+    for (Id id : candidates) candidate_set.insert(id);
 
+    // What each function touches: itself, then through what it calls (there is no recursion, so this settles).
     std::map<Id, std::set<Id>> touched;
-    auto scan = [&](const std::vector<Function>& functions) {
-        bool changed = false;
-        for (const Function& function : functions) {
+    std::vector<std::pair<Id, Id>> calls;
+    for (const std::vector<Function>* functions : {&stage_functions, &traversal_functions, &helper_functions})
+        for (const Function& function : *functions) {
             std::set<Id>& set = touched[function.id()];
-            const size_t before = set.size();
             for (const Block& block : function.blocks)
                 for (const Inst& inst : block.insts) {
+                    if (inst.op == Op::OpFunctionCall) calls.push_back({function.id(), inst.ops[0]});
                     inst.for_each_id([&](Id id) {
-                        if (candidate_set.count(id)) set.insert(id);
+                        if (candidate_set.contains(id)) set.insert(id);
                     });
-                    if (inst.op == Op::OpFunctionCall) {
-                        const std::set<Id> callee = touched[inst.ops[0]];
-                        set.insert(callee.begin(), callee.end());
-                    }
                 }
-            changed |= set.size() != before;
         }
-        return changed;
-    };
-    while (scan(stage_functions) | scan(traversal_functions) | scan(helper_functions)) {
+    for (bool changed = true; changed;) {
+        changed = false;
+        for (const auto& [caller, callee] : calls) {
+            const auto from = touched.find(callee);
+            if (from == touched.end() || from->second.empty()) continue;
+            std::set<Id>& to = touched[caller];
+            const size_t before = to.size();
+            to.insert(from->second.begin(), from->second.end());
+            changed |= to.size() != before;
+        }
     }
 
     std::set<Id> carried;

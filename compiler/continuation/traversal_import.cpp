@@ -170,31 +170,43 @@ ir::Module prepare(const ir::Module& words, const std::map<uint32_t, bool>& choi
                     p.decorate(inst.result, spv::Decoration::NoContraction);
             }
     // Decorations and names of code that is gone.
-    ir::IdSet there;
-    for (const Inst& inst : p.module.globals) there.insert(inst.result);
+    ir::IdSet there, named;
+    for (const Inst& inst : p.module.globals) {
+        there.insert(inst.result);
+        named.insert(inst.result);
+    }
     for (const Function& function : functions) {
         there.insert(function.id());
+        named.insert(function.id());
         for (const Inst& inst : function.params) there.insert(inst.result);
         for (const Block& block : function.blocks)
             for (const Inst& inst : block.insts) there.insert(inst.result);
     }
-    auto is_gone = [&](const Inst& inst) { return !there.contains(inst.ops[0]); };
-    std::erase_if(p.module.decorations, is_gone);
-    std::erase_if(p.module.names, is_gone);
+    std::erase_if(p.module.decorations, [&](const Inst& inst) { return !there.contains(inst.ops[0]); });
+    // Names of locals would cost every pipeline time and help nobody.
+    std::erase_if(p.module.names, [&](const Inst& inst) { return !named.contains(inst.ops[0]); });
     for (Function& function : functions) function.prepared = true;
     p.module.functions = std::move(functions);
     return std::move(p.module);
 }
 
+struct Prepared {
+    ir::Module module;
+    std::map<std::string, Id> exports;
+};
+
 // Prepared modules live as long as the process; there are as many as combinations of choices that occur.
-const ir::Module& prepared(const TraversalModule& module, const std::map<uint32_t, bool>& choices) {
+const Prepared& prepared(const TraversalModule& module, const std::map<uint32_t, bool>& choices) {
     static std::mutex mutex;
-    static std::map<std::pair<const TraversalModule*, std::map<uint32_t, bool>>, std::unique_ptr<const ir::Module>> known;
+    static std::map<std::pair<const TraversalModule*, std::map<uint32_t, bool>>, std::unique_ptr<const Prepared>> known;
     const std::lock_guard lock(mutex);
-    std::unique_ptr<const ir::Module>& entry = known[{&module, choices}];
-    if (!entry)
-        entry = std::make_unique<const ir::Module>(
-            prepare(ir::read_module({module.words, module.words + module.count}, "traversal"), choices));
+    std::unique_ptr<const Prepared>& entry = known[{&module, choices}];
+    if (!entry) {
+        auto fresh = std::make_unique<Prepared>();
+        fresh->module = prepare(ir::read_module({module.words, module.words + module.count}, "traversal"), choices);
+        fresh->exports = exports_of(fresh->module);
+        entry = std::move(fresh);
+    }
     return *entry;
 }
 
@@ -204,15 +216,16 @@ void Machine::import_traversal(const TraversalModule& module, bool with_any_hit,
     any_hit = with_any_hit;
     aabbs = with_aabbs;
     resumable = with_budget;
-    const ir::Module& source = prepared(module, {{RTC_LINK_ANY_HIT, with_any_hit},
+    const Prepared& known = prepared(module, {{RTC_LINK_ANY_HIT, with_any_hit},
                                                  {RTC_LINK_AABBS, with_aabbs},
                                                  {RTC_LINK_TRIANGLES, true},
                                                  {RTC_LINK_RESUMABLE, with_budget}});
+    const ir::Module& source = known.module;
     ir::IdMap<Id> map;
     traversal_functions = p.import(source, map);
     p.module.version = source.version;
     if (module.addresses) p.module.addressing = source.addressing;
-    for (const auto& [name, id] : exports_of(source)) exports_.emplace(name, map.get(id));
+    for (const auto& [name, id] : known.exports) exports_.emplace(name, map.get(id));
     for (const Function& function : traversal_functions) export_types_[function.id()] = function.def.type;
     for (const Inst& inst : p.module.globals)
         if (inst.op == Op::OpVariable) {

@@ -2,6 +2,7 @@
 #include "ir/module.h"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 
 namespace rtc {
@@ -26,26 +27,25 @@ struct Row {
     OpInfo info;
 };
 
-const Row kRows[] = {
+constexpr Row kRows[] = {
 #define RTC_OP(value, name, has_type, has_result, pattern) {value, {name, has_type != 0, has_result != 0, pattern}},
 #include "ir/grammar.inc"
 #undef RTC_OP
 };
 
 // Opcode to row of the table plus one; 0 for none.
-std::vector<uint16_t> make_index() {
-    std::vector<uint16_t> index(8192, 0);
+constexpr auto kIndex = [] {
+    std::array<uint16_t, 8192> index{};
     for (size_t i = 0; i < std::size(kRows); ++i)
         if (kRows[i].value < index.size()) index[kRows[i].value] = static_cast<uint16_t>(i + 1);
     return index;
-}
+}();
 
 }  // namespace
 
 const OpInfo* op_info(Op op) {
-    static const std::vector<uint16_t> index = make_index();
     const auto value = static_cast<uint32_t>(op);
-    const uint16_t row = value < index.size() ? index[value] : uint16_t{0};
+    const uint16_t row = value < kIndex.size() ? kIndex[value] : uint16_t{0};
     return row ? &kRows[row - 1].info : nullptr;
 }
 

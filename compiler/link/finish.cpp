@@ -230,12 +230,8 @@ void declare_entry(Program& p, Id main, const LinkOptions& options, Reflection& 
 void declare_interface(ir::Module& m) {
     std::vector<Id>& interface = m.entry_points.front().interface;
     interface.clear();
-    ir::IdSet used;
-    for (const ir::Function& function : m.functions)
-        for (const ir::Block& block : function.blocks)
-            for (const Inst& inst : block.insts) inst.for_each_id([&](Id id) { used.insert(id); });
     for (const Inst& inst : m.globals) {
-        if (inst.op != Op::OpVariable || !used.contains(inst.result)) continue;
+        if (inst.op != Op::OpVariable) continue;
         const auto storage = static_cast<spv::StorageClass>(inst.ops[0]);
         if (m.version >= 0x00010400u || storage == spv::StorageClass::Input) interface.push_back(inst.result);
     }

@@ -37,7 +37,7 @@ void place_reserved(Program& program, continuation::Machine& machine, const Link
 void tidy(Program& program, const std::vector<Id>& roots);
 // The entry point's declaration, capabilities, extensions and version.
 void declare_entry(Program& program, Id main, const LinkOptions& options, Reflection& reflection);
-// The entry point's interface: the variables its version asks for that are used.
+// The entry point's interface: what its version asks for of the variables tidy has left.
 void declare_interface(ir::Module& module);
 std::vector<std::string> required_features(const ir::Module& module);
 

@@ -4,6 +4,7 @@
 
 #include "check/check.h"
 #include "continuation/machine.h"
+#include "ir/cleanup.h"
 #include "link/link.h"
 #include "lower/stage.h"
 #include "rtc/abi.h"
@@ -303,6 +304,8 @@ class Linker {
 
     // SPIRV-Tools' optimiser on everything but traversal.
     void optimize() {
+        for (ir::Function& function : program_.module.functions)
+            if (!function.prepared) ir::clean_up(program_, function);
         std::vector<uint32_t> words =
             ir::write_module(link::without_traversal(program_.module), options_.debug_info);
         std::string message;

@@ -44,14 +44,12 @@ bool optimize(std::vector<uint32_t>& spirv, Optimization level, std::string& mes
     // Local passes only. SPIRV-Tools' own recipes inline every function and turn the machine's
     // variables into phis of its loops: quadratic in the states, and drivers do it anyway.
     // Nothing here touches NoContraction, reorders float operations or renumbers ids (see partial.cpp).
-    optimizer.RegisterPass(spvtools::CreateDeadBranchElimPass());
-    optimizer.RegisterPass(spvtools::CreateLocalSingleBlockLoadStoreElimPass());
+    // Constant branches, known loads, dead code and short blocks are gone already (ir/cleanup.h).
     optimizer.RegisterPass(spvtools::CreateLocalAccessChainConvertPass());
     optimizer.RegisterPass(spvtools::CreateLocalSingleBlockLoadStoreElimPass());
     optimizer.RegisterPass(spvtools::CreateSimplificationPass());
     if (level == Optimization::Performance) optimizer.RegisterPass(spvtools::CreateLocalRedundancyEliminationPass());
     optimizer.RegisterPass(spvtools::CreateAggressiveDCEPass());
-    optimizer.RegisterPass(spvtools::CreateBlockMergePass());
     spvtools::OptimizerOptions options;
     options.set_preserve_spec_constants(true);
     options.set_run_validator(false);

@@ -141,7 +141,7 @@ TEST_F(Target, Compat) {
     const CliRun run = rtc("old.rgen --compat=gdc2019 -o old.spv");
     EXPECT_EQ(run.status, 0) << run.err;
     const CliRun bad = rtc("old.rgen --compat=gdc2018");
-    EXPECT_EQ(bad.status, 2);
+    EXPECT_EQ(bad.status, 1);
     EXPECT_THAT(bad.err, HasSubstr("expected gdc2019"));
 }
 
