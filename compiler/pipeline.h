@@ -4,7 +4,9 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -80,7 +82,26 @@ struct LinkOptions {
     uint32_t max_callable_depth = 0;    // 1..31; 0: 31
     int32_t reserved_set = -1;          // -1: highest used + 1
     uint32_t reserved_binding = 0;
+    bool specialize = true;             // remove what the pipeline and `assumptions` show not to be needed
+    uint32_t assumptions = 0;           // what scenes are promised to be: bits of Assumption
     std::string stop_after;             // for tests: name of the pass after which to print and stop
+};
+
+// A promise about every scene that is traced. Each is checked when rays begin: a scene that breaks one is not
+// traced (RTC_LAUNCH_ERROR_ASSUMPTION).
+struct Assumption {
+    const char* name;  // "opaque", "single-level", ...
+    uint32_t bit;      // RTC_FACT_* of the acceleration structure's header
+};
+std::span<const Assumption> assumptions();
+bool assumption_from_name(std::string_view name, uint32_t& bit);
+std::vector<std::string> assumption_names(uint32_t bits);
+
+// One fact about the pipeline or its scenes: what is known, why, and what it removed.
+struct FactReport {
+    std::string name;
+    std::string state;  // "proven", "assumed", "unknown"
+    std::string detail;
 };
 
 struct TraceSiteReport {
@@ -134,6 +155,8 @@ struct Reflection {
     std::vector<ResourceReport> resources;
     std::vector<SpecConstantReport> spec_constants;
     std::vector<TraceSiteReport> trace_sites;
+    std::vector<FactReport> facts;
+    uint32_t assumptions = 0;  // bits of Assumption that the module was linked with
     std::vector<std::string> required_features;  // Vulkan feature names the module needs, e.g. "shaderFloat64"
     uint32_t flags = 0;  // RTC_MODULE_*
     uint32_t identity = 0;

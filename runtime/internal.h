@@ -207,6 +207,12 @@ typedef struct RtrLaunchPlace {
     VkDeviceSize offset, size; /* in the control buffer */
 } RtrLaunchPlace;
 
+/* Indices into the list of rtrCmdDeclareScene of the first bottom level that is so; ~0: none. */
+typedef struct RtrDeclaredScene {
+    uint32_t triangles, aabbs, not_opaque;
+    uint32_t not_opaque_geometry;
+} RtrDeclaredScene;
+
 struct RtrRecorder_T {
     RtrDevice device;
     VkAllocationCallbacks allocator;
@@ -226,6 +232,7 @@ struct RtrRecorder_T {
     uint64_t max_tile_lanes;
     uint32_t max_rounds;
     uint32_t stack_size; /* set by the application; 0: not set */
+    RtrDeclaredScene scene;
     uint32_t set_call_count;
     RtrBoundSets set_calls[RTR_MAX_SET_CALLS];
     uint32_t push_size;
@@ -277,6 +284,12 @@ void rtr_warning(RtrDevice device, const char* id, const char* format, ...) RTR_
 /* Success for NULL; else an error that names the structure found behind `owner`::pNext. */
 VkResult rtr_check_chain(RtrDevice device, const char* owner, const void* next);
 VkResult rtr_not_begun(RtrRecorder recorder, const char* function);
+
+/* ---- Assumptions (assumptions.c) -------------------------------------------------------- */
+/* A broken assumption as text: RTC_FACT_* and a word of RTC_HDR_OFFENDERS. */
+void rtr_format_assumption(uint32_t fact, uint32_t offender, char* text, size_t size);
+/* Whether the declared scene is what the pipeline's module assumes, as far as the host can see. */
+VkResult rtr_check_scene(RtrRecorder recorder, const struct RtrPipeline_T* pipeline);
 
 /* ---- Recording helpers ---------------------------------------------------------------- */
 VkResult rtr_allocate_set(RtrRecorder recorder, VkDescriptorSetLayout layout, VkDescriptorSet* set);

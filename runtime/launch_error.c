@@ -26,7 +26,7 @@ VkResult rtrDecodeLaunchError(const uint32_t* words, RtrLaunchError* e) {
 }
 
 void rtrFormatLaunchError(const RtrLaunchError* e, char* text, size_t size) {
-    char what[160];
+    char what[384];
     switch (e->code) {
         case RTC_LAUNCH_ERROR_NONE:
             snprintf(what, sizeof what, "no error");
@@ -50,10 +50,7 @@ void rtrFormatLaunchError(const RtrLaunchError* e, char* text, size_t size) {
                 e->detail[0]);
             break;
         case RTC_LAUNCH_ERROR_ASSUMPTION:
-            snprintf(
-                what, sizeof what,
-                "the scene breaks an assumption the module was compiled with (fact 0x%x, first offender %u)",
-                e->detail[0], e->detail[1]);
+            rtr_format_assumption(e->detail[0], e->detail[1], what, sizeof what);
             break;
         case RTC_LAUNCH_ERROR_UNFINISHED:
             snprintf(what, sizeof what,
@@ -83,7 +80,7 @@ VkResult rtrGetLaunchError(RtrRecorder r, uint32_t index, const void* mapped, Rt
     memcpy(words, (const char*)mapped + info.offset, sizeof words);
     result = rtrDecodeLaunchError(words, e);
     if (result != VK_SUCCESS) {
-        char text[384];
+        char text[512];
         rtrFormatLaunchError(e, text, sizeof text);
         rtr_error(r->device, result, "launch-error", "launch %u: %s", index, text);
     }

@@ -53,6 +53,7 @@ VkResult rtrBeginRecorder(RtrRecorder r, VkCommandBuffer cmd) {
     r->set_call_count = 0;
     r->push_size = 0;
     r->stack_size = 0;
+    memset(&r->scene, 0xff, sizeof r->scene); /* nothing is declared */
     return VK_SUCCESS;
 }
 

@@ -544,6 +544,7 @@ static VkResult trace(RtrRecorder r, const RtrStridedBufferRegion* raygen, const
         if ((result = check_region(r, names[i], &l.region[i], i == 0)) != VK_SUCCESS) return result;
     }
     if (!w || !h || !d) return VK_SUCCESS;
+    if ((result = rtr_check_scene(r, l.p)) != VK_SUCCESS) return result;
     if (!r->control)
         return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "control-buffer",
                          "the recorder was created without a control region; launches need one");

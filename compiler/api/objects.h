@@ -76,6 +76,7 @@ struct rtcc_result {
     std::vector<rtcc_resource_info> resource_infos;
     std::vector<rtcc_spec_constant_info> spec_constant_infos;
     std::vector<rtcc_trace_site_info> trace_site_infos;
+    std::vector<rtcc_fact_info> fact_infos;
     std::vector<std::vector<const char*>> variable_names;
     std::vector<const char*> feature_names;
 

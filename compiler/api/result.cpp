@@ -46,7 +46,13 @@ void view_reflection(rtcc_result& result) {
     }
     for (const std::string& feature : r.required_features) result.feature_names.push_back(feature.c_str());
 
+    for (const rtc::FactReport& fact : r.facts)
+        result.fact_infos.push_back({fact.name.c_str(), fact.state.c_str(), fact.detail.c_str()});
+
     rtcc_reflection& view = result.view;
+    view.fact_count = result.fact_infos.size();
+    view.facts = result.fact_infos.data();
+    view.assumptions = r.assumptions;
     view.stage_count = result.stage_infos.size();
     view.stages = result.stage_infos.data();
     view.group_count = result.group_infos.size();

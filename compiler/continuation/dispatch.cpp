@@ -112,6 +112,15 @@ std::vector<Block> traverse_state(Machine& m) {
     });
     Emitter step = code.e();
     const Id event = m.call(step, "rtc_trace_step");
+    if (m.checks_scene) {
+        // The scene is not what was assumed: whatever the lane would write, it would be wrong.
+        Emitter e = code.e();
+        const Id refused = m.load(e, "rtc_refused");
+        code.branch(code.not_equal(refused, 0), [&] {
+            Emitter end = code.e();
+            m.go(end, kStateDone);
+        });
+    }
 
     code.branch(code.equal(event, RTC_STEP_DONE), [&] {
         const Id entry = p.module.new_id();

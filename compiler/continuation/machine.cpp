@@ -39,7 +39,17 @@ Id Machine::word(std::vector<Id>& words, uint32_t i, const char* name) {
     return words[i];
 }
 
+void Machine::freeze_link_constants(const std::map<uint32_t, uint32_t>& values) {
+    continuation::freeze_link_constants(p.module, values);
+    p.reindex();
+}
+
 Id Machine::function(const std::string& name) const { return variable(name); }
+
+Id Machine::find_export(const std::string& name) const {
+    const auto found = exports_.find(name);
+    return found == exports_.end() ? 0 : found->second;
+}
 
 Id Machine::variable(const std::string& name) const {
     const auto found = exports_.find(name);

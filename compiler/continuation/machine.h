@@ -57,8 +57,12 @@ class Machine {
 
     // ---- traversal exports, by the names of compiler/traversal ----
     std::vector<Function> traversal_functions;
-    void import_traversal(const TraversalModule& traversal, bool any_hit, bool aabbs, bool resumable);
+    // `choices`: link constants (RTC_LINK_*) known already.
+    void import_traversal(const TraversalModule& traversal, const std::map<uint32_t, uint32_t>& choices);
+    // Gives the other link constants their values, once the stages are known.
+    void freeze_link_constants(const std::map<uint32_t, uint32_t>& values);
     Id function(const std::string& name) const;
+    Id find_export(const std::string& name) const;  // 0 when there is none
     Id variable(const std::string& name) const;
     Id call(Emitter& e, const std::string& name, const std::vector<Id>& arguments = {}) const;
     Id load(Emitter& e, const std::string& name) const;
@@ -105,6 +109,7 @@ class Machine {
     uint32_t max_frame_words = 0;
     uint32_t max_depth = 1;
     uint32_t max_callable_depth = 0;
+    bool checks_scene = false;  // rays compare the scene with what is assumed of it
     bool any_hit = false, aabbs = false, traces = false, callables = false;
     std::vector<TraceSiteReport> sites;
 
@@ -153,6 +158,9 @@ class Machine {
     std::map<std::string, Id> exports_;
     std::map<Id, Id> export_types_;  // result types of traversal functions
 };
+
+// traversal_import.cpp
+void freeze_link_constants(ir::Module& module, const std::map<uint32_t, uint32_t>& values);
 
 // split.cpp: cuts a stage in memory form into states at its calls and adds them to the machine.
 void split_stage(Program& program, lower::Stage& stage, const lower::CallKinds& kinds, Machine& machine);

@@ -11,10 +11,9 @@
 #include "traversal/traversal_modules.h"
 
 namespace rtc::continuation {
-namespace {
 
-void freeze_link_constants(ir::Module& module, const std::map<uint32_t, bool>& values) {
-    std::map<Id, bool> frozen;
+void freeze_link_constants(ir::Module& module, const std::map<uint32_t, uint32_t>& values) {
+    std::map<Id, uint32_t> frozen;
     std::erase_if(module.decorations, [&](const Inst& inst) {
         if (inst.op != Op::OpDecorate || inst.ops[1] != static_cast<uint32_t>(spv::Decoration::SpecId)) return false;
         const auto found = values.find(inst.ops[2]);
@@ -22,10 +21,19 @@ void freeze_link_constants(ir::Module& module, const std::map<uint32_t, bool>& v
         frozen[inst.ops[0]] = found->second;
         return true;
     });
-    for (Inst& inst : module.globals)
-        if (const auto found = frozen.find(inst.result); found != frozen.end())
+    for (Inst& inst : module.globals) {
+        const auto found = frozen.find(inst.result);
+        if (found == frozen.end()) continue;
+        if (inst.op == Op::OpSpecConstant) {
+            inst.op = Op::OpConstant;
+            inst.ops = {found->second};
+        } else {
             inst.op = found->second ? Op::OpConstantTrue : Op::OpConstantFalse;
+        }
+    }
 }
+
+namespace {
 
 bool is_float_operation(Op op) {
     switch (op) {
@@ -145,7 +153,7 @@ void drop_unreached(std::vector<Function>& functions, const std::map<std::string
     std::erase_if(functions, [&](const Function& function) { return !reached.contains(function.id()); });
 }
 
-ir::Module prepare(const ir::Module& words, const std::map<uint32_t, bool>& choices) {
+ir::Module prepare(const ir::Module& words, const std::map<uint32_t, uint32_t>& choices) {
     ir::Module source = words;
     freeze_link_constants(source, choices);
     source.entry_points.clear();
@@ -196,9 +204,9 @@ struct Prepared {
 };
 
 // Prepared modules live as long as the process; there are as many as combinations of choices that occur.
-const Prepared& prepared(const TraversalModule& module, const std::map<uint32_t, bool>& choices) {
+const Prepared& prepared(const TraversalModule& module, const std::map<uint32_t, uint32_t>& choices) {
     static std::mutex mutex;
-    static std::map<std::pair<const TraversalModule*, std::map<uint32_t, bool>>, std::unique_ptr<const Prepared>> known;
+    static std::map<std::pair<const TraversalModule*, std::map<uint32_t, uint32_t>>, std::unique_ptr<const Prepared>> known;
     const std::lock_guard lock(mutex);
     std::unique_ptr<const Prepared>& entry = known[{&module, choices}];
     if (!entry) {
@@ -212,14 +220,8 @@ const Prepared& prepared(const TraversalModule& module, const std::map<uint32_t,
 
 }  // namespace
 
-void Machine::import_traversal(const TraversalModule& module, bool with_any_hit, bool with_aabbs, bool with_budget) {
-    any_hit = with_any_hit;
-    aabbs = with_aabbs;
-    resumable = with_budget;
-    const Prepared& known = prepared(module, {{RTC_LINK_ANY_HIT, with_any_hit},
-                                                 {RTC_LINK_AABBS, with_aabbs},
-                                                 {RTC_LINK_TRIANGLES, true},
-                                                 {RTC_LINK_RESUMABLE, with_budget}});
+void Machine::import_traversal(const TraversalModule& module, const std::map<uint32_t, uint32_t>& choices) {
+    const Prepared& known = prepared(module, choices);
     const ir::Module& source = known.module;
     ir::IdMap<Id> map;
     traversal_functions = p.import(source, map);

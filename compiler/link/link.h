@@ -2,6 +2,7 @@
 #pragma once
 
 #include "continuation/machine.h"
+#include "link/bits.h"
 #include "lower/stage.h"
 
 namespace rtc::link {
@@ -15,6 +16,44 @@ using ir::Program;
 // open ids that are unique in the pipeline. `used` collects the ids given out.
 void specialize(ir::Module& module, const StageInput& stage, std::map<uint32_t, uint32_t>& used,
                 std::vector<SpecConstantReport>& report);
+
+// fold.cpp: constants, branches never taken and variables never read, in everything `main` reaches.
+// `given`: what loads of these variables give, whatever is stored; stores to those whose content is one
+// constant are dropped. remove_dead keeps words of a waiting ray (`save` calling `scratch_store`) only where
+// somebody reads their variable.
+void fold(Program& program, Id main, const std::map<Id, Bits>& given);
+void remove_dead(Program& program, Id main, Id save, Id scratch_store);
+
+// facts.cpp: what is known about a pipeline's rays and scene, see docs/specialisation.md.
+struct TraceFacts {
+    uint32_t sites = 0;
+    Bits flags, mask, offset, stride, miss;  // certain at every trace site
+};
+// Adds a stage's trace sites. The stage is in memory form.
+void collect_trace_facts(const Program& program, const lower::Stage& stage, TraceFacts& facts);
+
+// What of the traversal a pipeline needs.
+struct Needs {
+    bool any_hit = true;
+    bool aabbs = true;
+    bool triangles = true;
+    bool mixed = true;           // instances may hold either
+    bool non_opaque = true;      // geometries or instances may be not opaque
+    bool masks = true;           // instance masks other than 0xff
+    bool instance_flags = true;
+    bool transforms = true;
+    bool levels = true;          // more than one instance
+};
+// Of the scene alone, as the user promised: all but any_hit, aabbs and triangles.
+Needs scene_needs(const LinkOptions& options);
+// `reports` receives a line per fact. `records`, `nested`: some stage reads its record; traces from a hit or miss.
+struct PipelineShape {
+    bool has_any_hit = false, has_intersection = false;
+    bool records = false, nested = false;
+    uint32_t recursion_depth = 1;
+};
+Needs decide(const TraceFacts& traces, const PipelineShape& shape, const LinkOptions& options,
+             std::vector<FactReport>& reports);
 
 // resources.cpp: one variable per resource, whichever stages declare it; conflicts are errors. `known` holds
 // what earlier stages declared, by set, binding and type.

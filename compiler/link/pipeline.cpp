@@ -48,6 +48,11 @@ class Linker {
         std::map<uint32_t, uint32_t> spec_ids;
         for (size_t i = 0; i < input_.stages.size(); ++i) add_stage(static_cast<uint32_t>(i), spec_ids);
         check::check_data_types(program_, data_types_, result_.diagnostics);
+        decide_needs();
+        if (options_.stop_after == "facts") {
+            dump_facts();
+            return;
+        }
         if (options_.stop_after == "split") {
             dump_states();
             return;
@@ -61,9 +66,10 @@ class Linker {
         if (input_.stages.empty()) ir::fail("pipeline-empty", "", 0, "a pipeline needs at least one stage");
         if (input_.stages.size() > 4000)
             ir::fail("pipeline-too-large", "", 0, "a pipeline of more than 4000 stages is not supported");
-        if (!options_.stop_after.empty() && options_.stop_after != "split" && options_.stop_after != "finish")
+        if (!options_.stop_after.empty() && options_.stop_after != "facts" && options_.stop_after != "split" &&
+            options_.stop_after != "finish")
             ir::fail("unknown-pass", "", 0,
-                     "no pass is called '" + options_.stop_after + "'; text can be had after 'split' and 'finish'");
+                     "no pass is called '" + options_.stop_after + "'; text can be had after 'facts', 'split' and 'finish'");
         if (options_.max_recursion_depth > 31)
             ir::fail("recursion-limit", "", 0, "the recursion depth is at most 31");
         bool raygen = false;
@@ -102,7 +108,7 @@ class Linker {
     }
 
     void set_depths() {
-        bool nested = false;
+        bool& nested = nested_;
         for (size_t i = 0; i < modules_.size(); ++i)
             if (input_.stages[i].kind != StageKind::RayGen)
                 for (const ir::Function& function : modules_[i].functions)
@@ -117,8 +123,22 @@ class Linker {
         const TraversalModule* traversal = find_traversal_module("watertight", machine_.addresses());
         // Reports always hand over to the machine: it ends the shader after an accepted first hit.
         kinds_.report_suspends = true;
-        kinds_.loops_suspend = options_.resumable;
-        machine_.import_traversal(*traversal, has(StageKind::AnyHit), has(StageKind::Intersection), options_.resumable);
+        kinds_.loops_suspend = machine_.resumable = options_.resumable;
+        machine_.any_hit = has(StageKind::AnyHit);
+        machine_.aabbs = has(StageKind::Intersection);
+        // What the stages will say is not known yet; what follows from the lists and promises is.
+        std::map<uint32_t, uint32_t> choices{{RTC_LINK_RESUMABLE, options_.resumable}};
+        if (!machine_.any_hit) choices[RTC_LINK_ANY_HIT] = 0;
+        if (!machine_.aabbs) choices[RTC_LINK_AABBS] = 0;
+        const link::Needs scene = link::scene_needs(options_);
+        choices[RTC_LINK_MIXED] = scene.mixed;
+        choices[RTC_LINK_NON_OPAQUE] = scene.non_opaque;
+        choices[RTC_LINK_MASKS] = scene.masks;
+        choices[RTC_LINK_INSTANCE_FLAGS] = scene.instance_flags;
+        choices[RTC_LINK_TRANSFORMS] = scene.transforms;
+        choices[RTC_LINK_LEVELS] = scene.levels;
+        choices[RTC_LINK_ASSUMED] = options_.specialize ? options_.assumptions : 0;
+        machine_.import_traversal(*traversal, choices);
     }
 
     void add_stage(uint32_t index, std::map<uint32_t, uint32_t>& spec_ids) {
@@ -178,6 +198,7 @@ class Linker {
         // Last before the split: earlier passes may still move values between blocks.
         lower::to_memory_form(program_, stage, kinds_);
         if (machine_.resumable) lower::count_loops(program_, stage, machine_);
+        link::collect_trace_facts(program_, stage, trace_facts_);
 
         StageReport report;
         report.kind = stage.kind;
@@ -200,6 +221,74 @@ class Linker {
                 machine_.stage_variables.push_back(id);
         if (stage.record_base) machine_.stage_variables.push_back(stage.record_base);
         for (ir::Function& function : stage.functions) helpers_.push_back(std::move(function));
+    }
+
+    // What the pipeline and its scenes do not need is not linked: shaders that cannot run, parts of the traversal.
+    void decide_needs() {
+        link::PipelineShape shape;
+        shape.has_any_hit = has(StageKind::AnyHit);
+        shape.has_intersection = has(StageKind::Intersection);
+        shape.nested = nested_;
+        shape.recursion_depth = machine_.max_depth;
+        for (const StageReport& stage : result_.reflection.stages) shape.records |= stage.record_bytes != 0;
+        const link::Needs needs = link::decide(trace_facts_, shape, options_, result_.reflection.facts);
+        machine_.any_hit = needs.any_hit;
+        machine_.aabbs = needs.aabbs;
+        if (!needs.any_hit) remove_states(StageKind::AnyHit);
+        if (!needs.aabbs) remove_states(StageKind::Intersection);
+        const uint32_t assumed = machine_.traces && options_.specialize ? options_.assumptions : 0;
+        result_.reflection.assumptions = assumed;
+        machine_.checks_scene = assumed != 0;
+        machine_.freeze_link_constants({{RTC_LINK_ANY_HIT, needs.any_hit},
+                                        {RTC_LINK_AABBS, needs.aabbs},
+                                        {RTC_LINK_TRIANGLES, needs.triangles}});
+    }
+
+    void remove_states(StageKind kind) {
+        std::erase_if(machine_.states,
+                      [&](const continuation::State& state) { return input_.stages[state.stage].kind == kind; });
+        for (StageReport& stage : result_.reflection.stages)
+            if (stage.kind == kind) stage.states = 0;
+        removed_kinds_.insert(kind);
+    }
+
+    void dump_facts() {
+        for (const FactReport& fact : result_.reflection.facts)
+            result_.dump += fact.name + ": " + fact.state + ", " + fact.detail + "\n";
+        result_.ok = true;
+    }
+
+    // Traversal and machine without what they cannot need. (Not before: states look names up.)
+    void specialize_code() {
+        std::map<Id, link::Bits> given;
+        if (trace_facts_.sites) {
+            given[machine_.variable("rtc_ray_flags")] = trace_facts_.flags;
+            given[machine_.variable("rtc_ray_mask")] = trace_facts_.mask;
+            given[machine_.variable("rtc_ray_sbt_offset")] = trace_facts_.offset;
+            given[machine_.variable("rtc_ray_sbt_stride")] = trace_facts_.stride;
+            given[machine_.variable("rtc_ray_miss")] = trace_facts_.miss;
+        }
+        link::fold(program_, main_, given);
+        link::remove_dead(program_, main_, machine_.function("rtc_trace_save"), machine_.function("rtc_scratch_store"));
+        report_unread();
+    }
+
+    void report_unread() {
+        if (!trace_facts_.sites) return;
+        static const std::pair<const char*, const char*> kHit[] = {
+            {"rtc_hit_kind", "gl_HitKind"},         {"rtc_hit_primitive", "gl_PrimitiveID"},
+            {"rtc_hit_geometry", "gl_GeometryIndex"}, {"rtc_hit_attr0", "hit attributes"},
+        };
+        std::set<Id> read;
+        for (const ir::Function& function : program_.module.functions)
+            for (const ir::Block& block : function.blocks)
+                for (const Inst& inst : block.insts)
+                    if (inst.op == Op::OpLoad) read.insert(inst.ops[0]);
+        std::string unread;
+        for (const auto& [variable, name] : kHit)
+            if (!read.count(machine_.variable(variable))) unread += (unread.empty() ? "" : ", ") + std::string(name);
+        result_.reflection.facts.push_back({"built-ins read", "proven",
+                                            unread.empty() ? "all that a hit has" : "not " + unread + ": not kept"});
     }
 
     // The states as functions of their own, for golden tests: text before traversal is linked.
@@ -244,6 +333,7 @@ class Linker {
 
     void finish() {
         Reflection& r = result_.reflection;
+        if (options_.specialize) specialize_code();
         link::place_reserved(program_, machine_, options_, r);
         link::declare_entry(program_, main_, options_, r);
         link::tidy(program_, {main_});
@@ -322,7 +412,10 @@ class Linker {
             GroupReport report;
             report.kind = group.kind;
             report.name = group.name;
-            auto entry = [&](int stage) { return stage < 0 ? 0u : machine_.entry_state(static_cast<uint32_t>(stage)); };
+            auto entry = [&](int stage) {
+                const bool none = stage < 0 || removed_kinds_.count(input_.stages[static_cast<size_t>(stage)].kind);
+                return none ? 0u : machine_.entry_state(static_cast<uint32_t>(stage));
+            };
             report.handle[0] = group.kind == GroupKind::General ? entry(group.general) : entry(group.closest_hit);
             report.handle[1] = entry(group.any_hit);
             report.handle[2] = entry(group.intersection);
@@ -341,6 +434,9 @@ class Linker {
     check::DataTypes data_types_;
     std::vector<ir::Module> modules_;
     link::ResourceTable resources_;
+    link::TraceFacts trace_facts_;
+    std::set<StageKind> removed_kinds_;
+    bool nested_ = false;
     std::vector<ir::Function> helpers_;
     Id main_ = 0;
 };

@@ -147,6 +147,7 @@ RtcModuleHeader header_of(const Reflection& r, size_t json_bytes) {
     header.payload_words = r.payload_words;
     header.attribute_words = r.attribute_words;
     header.callable_words = r.callable_words;
+    header.assumptions = r.assumptions;
     header.json_bytes = static_cast<uint32_t>(json_bytes);
     return header;
 }

@@ -100,6 +100,10 @@ Json trace_site_json(const TraceSiteReport& site) {
             {"variables", site.variables}};
 }
 
+Json fact_json(const FactReport& fact) {
+    return {{"name", fact.name}, {"state", fact.state}, {"detail", fact.detail}};
+}
+
 template <typename T, typename F>
 Json list(const std::vector<T>& items, F&& one) {
     Json array = Json::array();
@@ -138,6 +142,8 @@ Json to_json(const Reflection& r) {
         {"resources", list(r.resources, resource_json)},
         {"specConstants", list(r.spec_constants, spec_constant_json)},
         {"traceSites", list(r.trace_sites, trace_site_json)},
+        {"assumptions", assumption_names(r.assumptions)},
+        {"facts", list(r.facts, fact_json)},
     };
 }
 
@@ -215,6 +221,18 @@ Reflection from_json(const Json& json) {
         site.callable = item.at("call").get<std::string>() == "callable";
         item.at("frameBytes").get_to(site.frame_bytes);
         item.at("variables").get_to(site.variables);
+    }
+    for (const Json& item : json.at("assumptions")) {
+        const std::string name = item.get<std::string>();
+        uint32_t bit = 0;
+        if (!assumption_from_name(name, bit)) throw std::runtime_error("unknown assumption '" + name + "'");
+        r.assumptions |= bit;
+    }
+    for (const Json& item : json.at("facts")) {
+        FactReport& fact = r.facts.emplace_back();
+        item.at("name").get_to(fact.name);
+        item.at("state").get_to(fact.state);
+        item.at("detail").get_to(fact.detail);
     }
     return r;
 }

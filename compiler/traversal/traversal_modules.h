@@ -27,6 +27,15 @@ inline constexpr uint32_t RTC_LINK_AABBS = 0x52540101u;      // false: no leaf h
 inline constexpr uint32_t RTC_LINK_TRIANGLES = 0x52540102u;  // false: no leaf holds triangles
 inline constexpr uint32_t RTC_LINK_RESUMABLE = 0x52540103u;  // false: RTC_SPEC_STEP_BUDGET is ignored
 
+// What only some scenes need (link/facts.cpp decides); true is the general case.
+inline constexpr uint32_t RTC_LINK_MIXED = 0x52540110u;           // false: all instances hold the same kind
+inline constexpr uint32_t RTC_LINK_NON_OPAQUE = 0x52540111u;      // false: all geometries and instances are opaque
+inline constexpr uint32_t RTC_LINK_MASKS = 0x52540112u;           // false: every instance mask is 0xff
+inline constexpr uint32_t RTC_LINK_INSTANCE_FLAGS = 0x52540113u;  // false: no instance has flags
+inline constexpr uint32_t RTC_LINK_TRANSFORMS = 0x52540114u;      // false: every instance transform is the identity
+inline constexpr uint32_t RTC_LINK_LEVELS = 0x52540115u;          // false: a top level has one instance at most
+inline constexpr uint32_t RTC_LINK_ASSUMED = 0x52540116u;         // uint: bits of Assumption, checked as rays begin
+
 // Words of lane storage that rtc_trace_save writes at most: 32 for ray, hit and
 // cursor, RTC_TRAVERSAL_STACK for the stack. (A lane whose stack is deeper does
 // not suspend until it is not.)

@@ -54,6 +54,16 @@
 #define RTC_HDR_PRIMITIVE_COUNT 21u /* as given to the build, inactive ones included */
 #define RTC_HDR_FIRST_OFFENDER 22u /* first instance/primitive that breaks a fact; ~0 if none */
 #define RTC_HDR_SINGLE_INSTANCE 23u /* top level with one active instance: its index + 1; otherwise 0 */
+#define RTC_HDR_OFFENDERS 24u /* 12 words, by the bit number of the fact: see RTC_OFFENDER_* */
+#define RTC_HDR_OFFENDERS_END 36u
+
+/* A word of RTC_HDR_OFFENDERS in a top level: the first instance for which the fact does not
+ * hold (for RTC_FACT_HAS_*: the first instance of that kind), and, where it is a geometry's
+ * doing, the first such geometry of its bottom level (at most 254); for RTC_FACT_SINGLE_LEVEL
+ * the number of active instances. In a bottom level: the geometry alone. ~0: none. */
+#define RTC_OFFENDER_INSTANCE_SHIFT 8u
+#define RTC_OFFENDER_GEOMETRY_MASK 0xffu
+#define RTC_OFFENDER_NO_GEOMETRY 0xffu
 
 #define RTC_AS_MAGIC (0x52540000u | RTC_ABI_VERSION)
 #define RTC_AS_KIND_TOP 0u
@@ -68,6 +78,12 @@
 #define RTC_FACT_HAS_TRIANGLES 32u /* TLAS: some instance is of triangles */
 #define RTC_FACT_HAS_AABBS 64u /* TLAS: some instance is of AABBs */
 #define RTC_FACT_ADDRESSES 128u /* address mode: SELF and instance references are device addresses */
+#define RTC_FACT_SINGLE_LEVEL 256u /* TLAS: one active instance, or none */
+
+/* Assumptions of a module (RtcModuleHeader.assumptions) are bits of facts. These facts say that
+ * something is there; the assumption is that it is not: HAS_AABBS set means "triangles only".
+ * Broken assumptions of a top level: assumptions & ~(facts ^ RTC_FACTS_OF_ABSENCE). */
+#define RTC_FACTS_OF_ABSENCE (RTC_FACT_HAS_TRIANGLES | RTC_FACT_HAS_AABBS)
 
 /* Binary node, 64 bytes, both children's boxes (conservative):
  *   quad 0: child0.min.xyz, child 0 reference
@@ -109,7 +125,8 @@
  *   quads 3..5: object-to-world, 3 rows of 4 (bit-exact copy of the input)
  *   quad 6: BLAS base low, BLAS base high, custom index | mask << 24,
  *           SBT record offset | instance flags << 24
- *   quad 7: BLAS facts, quads from BLAS base to its slots,
+ *   quad 7: BLAS facts (and RTC_FACT_IDENTITY_TRANSFORMS where this instance's transform
+ *           is the identity), quads from BLAS base to its slots,
  *           quads from BLAS base to its nodes, 0
  * An inactive instance (reference 0) has BLAS base 0. */
 #define RTC_INSTANCE_QUADS 8u
@@ -211,7 +228,7 @@
 #define RTC_LAUNCH_ERROR_CALLABLE_DEPTH 2u /* a callable below its limit was dropped */
 #define RTC_LAUNCH_ERROR_BAD_HANDLE 3u /* SBT record holds no state of this module; detail: word read */
 #define RTC_LAUNCH_ERROR_ABI 4u /* acceleration structure of another ABI version; detail: its magic */
-#define RTC_LAUNCH_ERROR_ASSUMPTION 5u /* a compiled assumption is broken; detail: RTC_FACT_*, detail2: offender */
+#define RTC_LAUNCH_ERROR_ASSUMPTION 5u /* a compiled assumption is broken; detail: RTC_FACT_*, detail2: word of RTC_HDR_OFFENDERS */
 #define RTC_LAUNCH_ERROR_UNFINISHED 6u /* lanes were still suspended when rounds ran out; detail: lanes */
 #define RTC_LAUNCH_ERROR_STACK 7u /* internal: traversal or word stack overflow */
 
@@ -243,7 +260,8 @@ typedef struct RtcModuleHeader {
     uint32_t attribute_words;
     uint32_t callable_words;
     uint32_t json_bytes;
-    uint32_t reserved[7];
+    uint32_t assumptions; /* bits of RTC_FACT_*: what scenes must be, see RTC_FACTS_OF_ABSENCE */
+    uint32_t reserved[6];
 } RtcModuleHeader;
 
 typedef struct RtcModuleGroup {

@@ -217,6 +217,19 @@ RTCC_EXPORT rtcc_status rtcc_options_set_addressing(rtcc_options_t options, rtcc
 RTCC_EXPORT rtcc_status rtcc_options_set_compat(rtcc_options_t options, rtcc_compat compat);
 /* Lanes can suspend and be resumed by a later dispatch. Default 1. */
 RTCC_EXPORT rtcc_status rtcc_options_set_resumable(rtcc_options_t options, int enable);
+/* Promises about every scene that the pipeline will trace, as names separated by commas or
+ * blanks: "opaque", "single-level", "identity-transforms", "no-masks", "no-instance-flags",
+ * "triangles", "aabbs" (docs/specialisation.md). They add to earlier ones and remove code. A
+ * scene that breaks one is not traced: launch error RTC_LAUNCH_ERROR_ASSUMPTION.
+ * RTCC_STATUS_INVALID_ARGUMENT for a name that does not exist. */
+RTCC_EXPORT rtcc_status rtcc_options_assume(rtcc_options_t options, const char* names);
+/* The same from a scene profile, JSON text that rtrWriteSceneProfile made. */
+RTCC_EXPORT rtcc_status rtcc_options_add_scene_profile(rtcc_options_t options, const char* json, size_t size);
+/* The names rtcc_options_assume knows; NULL past the end. */
+RTCC_EXPORT const char* rtcc_assumption_name(size_t index);
+/* Remove what the pipeline's code and the assumptions show not to be needed. Default 1; 0 is
+ * for comparison, and ignores assumptions. */
+RTCC_EXPORT rtcc_status rtcc_options_set_specialize(rtcc_options_t options, int enable);
 RTCC_EXPORT rtcc_status rtcc_options_set_warnings_as_errors(rtcc_options_t options, int enable);
 RTCC_EXPORT rtcc_status rtcc_options_set_suppress_warnings(rtcc_options_t options, int enable);
 /* For rtc's own tests: print the module after the pass of that name (rtcc_result_text) and stop. */
@@ -384,6 +397,13 @@ typedef struct rtcc_trace_site_info {
     const char* const* variables;
 } rtcc_trace_site_info;
 
+/* One thing that is known about the pipeline's rays or scenes, or that is not. */
+typedef struct rtcc_fact_info {
+    const char* name;   /* "no any-hit", "cull mask", "single-level", ... */
+    const char* state;  /* "proven" by the code, "assumed" by the user, "unknown" */
+    const char* detail; /* why, and what was removed for it */
+} rtcc_fact_info;
+
 typedef struct rtcc_reflection {
     size_t stage_count;
     const rtcc_stage_info* stages;
@@ -413,6 +433,9 @@ typedef struct rtcc_reflection {
     uint32_t callable_words;
     uint32_t spirv_version; /* word 1 of the module */
     uint32_t instruction_count;
+    size_t fact_count;
+    const rtcc_fact_info* facts;
+    uint32_t assumptions; /* RTC_FACT_* that scenes must meet, see RTC_FACTS_OF_ABSENCE */
 } rtcc_reflection;
 
 /* NULL unless the status is success and the result is a linked module. */

@@ -328,6 +328,33 @@ RTR_API VkResult rtrUpdateAccelerationStructureDescriptors(
     RtrDevice device, VkDescriptorSet dstSet, uint32_t dstBinding, uint32_t dstArrayElement, uint32_t count,
     const RtrAccelerationStructure* pAccelerationStructures, RtrHeap nullHeap);
 
+/* ---- Assumptions about scenes (rtc --assume, docs/specialisation.md) -----------------
+ * A module may have been told what scenes are: opaque, of one instance, and so on. Whether
+ * they are is checked when rays begin, by what the build kernels found: a launch that meets
+ * another scene traces nothing into it and sets the launch error RTC_LAUNCH_ERROR_ASSUMPTION,
+ * which names the assumption and the instance. */
+
+/* Tells the recorder which acceleration structures the launches that follow reach, so that
+ * what the host knows of them is checked when a launch is recorded (kinds of geometry, and
+ * opacity where the module assumes no instance flags), rather than by the device alone.
+ * Optional; replaces what was declared before; forgotten by rtrBeginRecorder. count 0:
+ * nothing is declared. Structures made by copies tell the host nothing. A launch that cannot
+ * be right fails with VALIDATION_FAILED ("assumption") and is not recorded. */
+RTR_API VkResult rtrCmdDeclareScene(RtrRecorder recorder, uint32_t count,
+                                    const RtrAccelerationStructure* pAccelerationStructures);
+
+/* Bytes of a header that rtrWriteSceneProfile reads: the start of the range that
+ * rtrGetAccelerationStructureDescriptor gives. */
+#define RTR_SCENE_PROFILE_HEADER_BYTES 256u
+
+/* What is true of all these built top levels, as JSON for `rtc --scene-profile`: the
+ * assumptions they meet. ppHeaders: their headers, copied from the device after the build.
+ * Two-call idiom: pText NULL stores the size in *pSize; otherwise *pSize bytes are there (no
+ * terminator is written) and receives the size; VK_INCOMPLETE when they do not suffice.
+ * Errors: VALIDATION_FAILED for a header that is not that of a built top level. */
+RTR_API VkResult rtrWriteSceneProfile(RtrDevice device, uint32_t headerCount, const void* const* ppHeaders,
+                                      size_t* pSize, char* pText);
+
 /* ---- Recorder --------------------------------------------------------------------- */
 
 typedef struct RtrRecorderCreateInfo {

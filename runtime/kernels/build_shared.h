@@ -51,6 +51,7 @@
 #define RTR_ST_NODES 10u   /* encoded nodes */
 #define RTR_ST_ROOT 11u    /* inner node that is the root */
 #define RTR_ST_DEEP 12u    /* 1: deeper than RTC_MAX_DEPTH after rotating */
+#define RTR_ST_OFFENDERS 16u /* 12: words of RTC_HDR_OFFENDERS */
 #define RTR_ST_SUMS 64u  /* block sums and histograms start here */
 
 #define RTR_SORT_ITEMS 8u
@@ -108,7 +109,7 @@ struct RtrBuildPush {
     RTR_UINT src_hi;
     RTR_UINT heap_quads;     /* size of the heap: instance references are checked against it */
     RTR_UINT vertex_format;  /* RTR_VERTEX_* */
-    RTR_UINT pad;
+    RTR_UINT not_opaque;     /* header of a bottom level: its word of RTC_HDR_OFFENDERS */
 };
 
 /* What the property kernel answers (p.count). */

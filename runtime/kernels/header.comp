@@ -2,6 +2,7 @@
 #extension GL_GOOGLE_include_directive : require
 // Last dispatch of a build: the header. Lane w writes word w.
 #include "common.glsl"
+#include "facts.glsl"
 
 void main() {
     uint w = gl_LocalInvocationIndex;
@@ -22,11 +23,7 @@ void main() {
         hi = node_box[2u * root + 1u].xyz;
     }
     uint facts = p.facts;
-    if (top) {
-        facts = (RTC_FACT_ALL_OPAQUE | RTC_FACT_IDENTITY_TRANSFORMS | RTC_FACT_FULL_MASKS |
-                 RTC_FACT_NO_INSTANCE_FLAGS) & ~state[RTR_ST_BROKEN];
-        facts |= state[RTR_ST_HAS] | (p.facts & RTC_FACT_ADDRESSES);
-    }
+    if (top) facts = top_facts(n);
     uint v = 0u;
     if (w == RTC_HDR_SELF_LO) v = p.self_lo;
     else if (w == RTC_HDR_SELF_HI) v = p.self_hi;
@@ -51,5 +48,6 @@ void main() {
     else if (w == RTC_HDR_PRIMITIVE_COUNT) v = p.total;
     else if (w == RTC_HDR_FIRST_OFFENDER) v = state[RTR_ST_OFFENDER];
     else if (w == RTC_HDR_SINGLE_INSTANCE) v = top && n == 1u ? pairs_a[0].y + 1u : 0u;
+    else if (w >= RTC_HDR_OFFENDERS && w < RTC_HDR_OFFENDERS_END) v = offender(w - RTC_HDR_OFFENDERS, n);
     dst_header[w] = v;
 }

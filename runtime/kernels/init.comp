@@ -12,4 +12,5 @@ void main() {
         state[RTR_ST_CENTER_MAX + lane] = 0u;
     }
     if (lane == 3u) state[RTR_ST_OFFENDER] = 0xffffffffu;
+    if (lane >= RTR_ST_OFFENDERS && lane < RTR_ST_OFFENDERS + 12u) state[lane] = 0xffffffffu;
 }

@@ -192,7 +192,9 @@ void main() {
                                             in_data[at + 4u * r + 2u], in_data[at + 4u * r + 3u]);
         }
         dst_slots[rec + 6u] = uvec4(active_ ? base_lo : 0u, active_ ? base_hi : 0u, id_mask, sbt_flags);
-        dst_slots[rec + 7u] = uvec4(facts, slots, nodes, 0u);
+        bool identity = m[0] == vec4(1.0, 0.0, 0.0, 0.0) && m[1] == vec4(0.0, 1.0, 0.0, 0.0) &&
+                        m[2] == vec4(0.0, 0.0, 1.0, 0.0);
+        dst_slots[rec + 7u] = uvec4(facts | (identity ? RTC_FACT_IDENTITY_TRANSFORMS : 0u), slots, nodes, 0u);
 
         if (active_) {
             uint flags = sbt_flags >> 24;
@@ -202,15 +204,25 @@ void main() {
             if (!opaque) broken |= RTC_FACT_ALL_OPAQUE;
             if ((id_mask >> 24) != 0xffu) broken |= RTC_FACT_FULL_MASKS;
             if (flags != 0u) broken |= RTC_FACT_NO_INSTANCE_FLAGS;
-            if (m[0] != vec4(1.0, 0.0, 0.0, 0.0) || m[1] != vec4(0.0, 1.0, 0.0, 0.0) ||
-                m[2] != vec4(0.0, 0.0, 1.0, 0.0))
-                broken |= RTC_FACT_IDENTITY_TRANSFORMS;
+            if (!identity) broken |= RTC_FACT_IDENTITY_TRANSFORMS;
             if (broken != 0u) {
                 atomicOr(state[RTR_ST_BROKEN], broken);
                 atomicMin(state[RTR_ST_OFFENDER], p.first + i);
             }
-            atomicOr(state[RTR_ST_HAS],
-                     (facts & RTC_FACT_AABBS) != 0u ? RTC_FACT_HAS_AABBS : RTC_FACT_HAS_TRIANGLES);
+            uint has = (facts & RTC_FACT_AABBS) != 0u ? RTC_FACT_HAS_AABBS : RTC_FACT_HAS_TRIANGLES;
+            atomicOr(state[RTR_ST_HAS], has);
+            // The first of each kind, for launches that assumed otherwise.
+            uint word = (p.first + i) << RTC_OFFENDER_INSTANCE_SHIFT;
+            for (uint left = broken | has; left != 0u; left &= left - 1u) {
+                uint bit = findLSB(left);
+                uint geometry = RTC_OFFENDER_NO_GEOMETRY;
+                if ((1u << bit) == RTC_FACT_ALL_OPAQUE && (flags & RTC_INSTANCE_FORCE_NO_OPAQUE) == 0u) {
+                    uint first = block_quad(base_lo, base_hi, (RTC_HDR_OFFENDERS + bit) / 4u)[(RTC_HDR_OFFENDERS + bit) & 3u];
+                    geometry = min(first, RTC_OFFENDER_NO_GEOMETRY);
+                }
+                if (state[RTR_ST_OFFENDERS + bit] > (word | geometry))
+                    atomicMin(state[RTR_ST_OFFENDERS + bit], word | geometry);
+            }
         }
     }
     store_leaf(in_range, p.first + i, active_, lo, hi);

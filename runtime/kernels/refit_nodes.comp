@@ -5,6 +5,7 @@
 // goes on to the parent; see lbvh_fit.comp.
 #define RTR_COHERENT coherent
 #include "common.glsl"
+#include "facts.glsl"
 
 void leaf_child(uint node, uint side, uint ref) {
     uint count = (ref >> RTC_REF_COUNT_SHIFT) & RTC_REF_COUNT_MASK;
@@ -57,9 +58,10 @@ void main() {
                     dst_header[RTC_HDR_BOUNDS_MAX + k] = floatBitsToUint(hi[k]);
                 }
                 if ((p.flags & RTR_BUILD_TOP) != 0u) {
-                    dst_header[RTC_HDR_FACTS] = state[RTR_ST_HAS] | (p.facts & RTC_FACT_ADDRESSES) |
-                        ((RTC_FACT_ALL_OPAQUE | RTC_FACT_IDENTITY_TRANSFORMS | RTC_FACT_FULL_MASKS |
-                          RTC_FACT_NO_INSTANCE_FLAGS) & ~state[RTR_ST_BROKEN]);
+                    uint n = dst_header[RTC_HDR_ACTIVE_COUNT];
+                    dst_header[RTC_HDR_FACTS] = top_facts(n);
+                    for (uint bit = 0u; bit < RTC_HDR_OFFENDERS_END - RTC_HDR_OFFENDERS; bit++)
+                        dst_header[RTC_HDR_OFFENDERS + bit] = offender(bit, n);
                     dst_header[RTC_HDR_FIRST_OFFENDER] = state[RTR_ST_OFFENDER];
                 }
             }

@@ -75,7 +75,18 @@ GroupInput read_group(std::istringstream& words, const PipelineInput& input) {
 void read_option(std::istringstream& words, LinkOptions& options) {
     std::string name;
     long value = 0;
-    if (!(words >> name >> value)) throw GoldenError("an option needs a name and a number");
+    words >> name;
+    if (name == "assume") {
+        std::string list, one;
+        words >> list;
+        for (std::istringstream names(list); std::getline(names, one, ',');) {
+            uint32_t bit = 0;
+            if (!assumption_from_name(one, bit)) throw GoldenError("no assumption is named '" + one + "'");
+            options.assumptions |= bit;
+        }
+        return;
+    }
+    if (!(words >> value)) throw GoldenError("an option needs a name and a number");
     if (name == "max-recursion-depth") {
         options.max_recursion_depth = static_cast<uint32_t>(value);
     } else if (name == "max-callable-depth") {
@@ -86,6 +97,8 @@ void read_option(std::istringstream& words, LinkOptions& options) {
         options.optimize = value ? Optimization::Performance : Optimization::None;
     } else if (name == "resumable") {
         options.resumable = value != 0;
+    } else if (name == "specialize") {
+        options.specialize = value != 0;
     } else if (name == "debug-info") {
         options.debug_info = value != 0;
     } else {

@@ -28,7 +28,8 @@ struct GoldenError : std::runtime_error {
 //   stage KIND NAME FILE[:ENTRY] [spec.ID=VALUE...]   FILE is GLSL; FILE.spvasm beside it is what is linked
 //   group general NAME
 //   group triangles|procedural NAME [closest-hit=STAGE] [any-hit=STAGE] [intersection=STAGE]
-//   option max-recursion-depth|max-callable-depth|reserved-set|optimize|resumable|debug-info VALUE
+//   option max-recursion-depth|max-callable-depth|reserved-set|optimize|resumable|debug-info|specialize VALUE
+//   option assume NAME[,NAME...]
 //   dump PASS
 GoldenCase read_golden_case(const std::filesystem::path& folder);
 

@@ -105,7 +105,8 @@ INSTANTIATE_TEST_SUITE_P(Sets, Golden, testing::ValuesIn(golden_folders(RTC_GOLD
 int update(const fs::path& folder) {
     const GoldenCase golden = read_golden_case(folder);
     const LinkResult result = link_pipeline(golden.input, golden.options);
-    if (!result.ok || result.dump.find("OpFunction") == std::string::npos) {
+    const bool code = golden.options.stop_after != "facts";
+    if (!result.ok || (code && result.dump.find("OpFunction") == std::string::npos)) {
         std::fprintf(stderr, "%s: not linked, expected.txt left alone\n%s", golden.name.c_str(),
                      (errors(result) + result.dump).substr(0, 1000).c_str());
         return 1;

@@ -174,6 +174,8 @@ class Parser {
                 out_.validate = false;
             else if (name == "--no-resumable")
                 out_.resumable = false;
+            else if (name == "--no-specialize")
+                out_.specialize = false;
             else if (takes_value(name))
                 valued(name, next(name));
             else
@@ -186,7 +188,8 @@ class Parser {
 
     static bool takes_value(std::string_view name) {
         for (std::string_view known :
-             {"--addressing", "--compat", "--hit-group", "--stage", "--pipeline", "--reflect", "--target-env", "--max-recursion-depth",
+             {"--addressing", "--assume", "--compat", "--hit-group", "--stage", "--scene-profile", "--pipeline",
+              "--reflect", "--target-env", "--max-recursion-depth",
               "--max-callable-depth", "--reserved", "--dump-after"})
             if (name == known) return true;
         return false;
@@ -209,6 +212,12 @@ class Parser {
             pipeline.kind = InputArgument::Kind::Pipeline;
             pipeline.file = value;
             out_.inputs.push_back(std::move(pipeline));
+        } else if (name == "--assume") {
+            if (value.empty()) invalid_value(name, value);
+            out_.assume.push_back(value);
+        } else if (name == "--scene-profile") {
+            if (value.empty()) invalid_value(name, value);
+            out_.scene_profiles.push_back(value);
         } else if (name == "--reflect") {
             if (value.empty()) invalid_value(name, value);
             out_.reflect = value;

@@ -17,6 +17,11 @@ Options:
   --addressing=<mode>
                     How acceleration structures are reached: heap (default;
                     plain Vulkan 1.1) or address (needs bufferDeviceAddress).
+  --assume=<name>[,<name>...]
+                    Promise about every scene traced: opaque, single-level,
+                    identity-transforms, no-masks, no-instance-flags, triangles,
+                    aabbs. Removes code; a scene that breaks a promise is not
+                    traced and sets the launch error.
   -c                Only compile: each GLSL file to its own SPIR-V stage
                     (FILE.spv), nothing is linked.
   --compat=gdc2019  Accept spellings of "RTX on Vulkan" (GDC 2019): blocks used
@@ -59,6 +64,8 @@ Options:
                     num. Default is bin.
   --no-resumable    Lanes cannot suspend: smaller and faster modules, but long
                     launches end early on drivers that limit loops.
+  --no-specialize   Keep what the pipeline and --assume show not to be needed
+                    (for comparison).
   --no-validate     Do not run the SPIR-V validator on the result.
   -O                Optimize the generated SPIR-V code for performance.
   -Os               Optimize the generated SPIR-V code for size.
@@ -71,10 +78,13 @@ Options:
                     Write the pipeline's reflection as JSON. Also reads it from
                     a finished module given as the only input.
   --report          Print states, frame bytes at each trace site and
-                    instruction counts.
+                    instruction counts; what is known about rays and scenes and
+                    what that removed.
   --reserved=<set>[.<binding>]
                     Put rtc's own descriptors into this set, from that binding
                     on. Default: the highest set used + 1, from binding 0.
+  --scene-profile <file.json>
+                    Assume what rtrWriteSceneProfile found true of a scene.
   -S                Emit SPIR-V assembly instead of binary.
   --stage=<name>=<kind>:<file>[:<entry>][,spec.<id>=<value>...]
                     A stage by name: its kind (rgen ... rcall), file, entry
@@ -103,7 +113,8 @@ A pipeline file:
                  "entry": "main", "spec": {"0": 4, "1": 0.5}} ],
     "groups": [ {"name": "camera", "general": "camera"},
                 {"name": "glass", "closestHit": "c", "anyHit": "a"} ] }
-"kind", "entry", "spec" and "groups" may be left out.
+"kind", "entry", "spec" and "groups" may be left out. Beside "stages":
+"assume": ["opaque", ...] and "sceneProfile": "file.json".
 
 Exit status: 0 success, 1 errors in the inputs or on the command line (as glslc).
 )",

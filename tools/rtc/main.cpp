@@ -31,6 +31,13 @@ void require(rtcc_status status, const std::string& what) {
     if (status != RTCC_STATUS_SUCCESS) throw UsageError(what);
 }
 
+std::string assumption_list() {
+    std::string names;
+    for (size_t i = 0; rtcc_assumption_name(i); ++i)
+        names += (i ? ", " : "") + std::string(rtcc_assumption_name(i));
+    return names;
+}
+
 Options make_options(const Arguments& arguments) {
     Options options(rtcc_options_create());
     rtcc_options_t o = options.get();
@@ -56,6 +63,10 @@ Options make_options(const Arguments& arguments) {
     rtcc_options_set_addressing(o, arguments.addressing);
     rtcc_options_set_compat(o, arguments.compat);
     rtcc_options_set_resumable(o, arguments.resumable);
+    rtcc_options_set_specialize(o, arguments.specialize);
+    for (const std::string& list : arguments.assume)
+        require(rtcc_options_assume(o, list.c_str()),
+                "invalid value '" + list + "' in '--assume=" + list + "': expected a list of " + assumption_list());
     // As glslc has it, -M implies -w: only what it finds matters.
     rtcc_options_set_suppress_warnings(o,
                                        arguments.suppress_warnings || arguments.mode == Mode::Dependencies);
@@ -70,6 +81,7 @@ class Program {
         : arguments_(arguments), compiler_(rtcc_compiler_create()), options_(make_options(arguments)) {}
 
     int run() {
+        for (const std::string& file : arguments_.scene_profiles) add_scene_profile(file, file);
         bool ok = false;
         if (is_finished_module()) {
             ok = reflect_module();
@@ -182,7 +194,27 @@ class Program {
         return format_words(rtcc_result_words(result), rtcc_result_word_count(result), arguments_.format);
     }
 
+    void add_scene_profile(const std::string& file, const std::string& shown) {
+        const std::string text = read_input(file);
+        if (rtcc_options_add_scene_profile(options_.get(), text.data(), text.size()) != RTCC_STATUS_SUCCESS)
+            throw InputError("rtc: error: '" + shown + "' is no scene profile of this version: expected what "
+                             "rtrWriteSceneProfile wrote");
+    }
+
+    // The same pipeline with nothing removed, for the report.
+    void report_unspecialized(rtcc_const_pipeline_t pipeline, const rtcc_reflection& now) const {
+        const Options plain(rtcc_options_clone(options_.get()));
+        rtcc_options_set_specialize(plain.get(), 0);
+        const Result result(rtcc_compile_pipeline(compiler_.get(), pipeline, plain.get()));
+        if (const rtcc_reflection* before = rtcc_result_reflection(result.get()))
+            print(comparison_text(*before, now));
+    }
+
     bool link(const Plan& plan) {
+        for (const std::string& list : plan.assume)
+            if (rtcc_options_assume(options_.get(), list.c_str()) != RTCC_STATUS_SUCCESS)
+                throw InputError("rtc: error: \"assume\": '" + list + "' is none of " + assumption_list());
+        for (const std::string& file : plan.scene_profiles) add_scene_profile(file, file);
         const Pipeline pipeline = make_pipeline(plan);
         const Result result(rtcc_compile_pipeline(compiler_.get(), pipeline.get(), options_.get()));
         if (!accept(result)) return false;
@@ -195,6 +227,9 @@ class Program {
         write_output(output, module_text(result.get()));
         if (arguments_.dependency_file) write_dependencies(result.get(), plan, output);
         write_reflection(result.get(), output);
+        if (arguments_.report && arguments_.specialize)
+            if (const rtcc_reflection* now = rtcc_result_reflection(result.get()))
+                report_unspecialized(pipeline.get(), *now);
         return true;
     }
 

@@ -3,7 +3,8 @@
 //   { "stages": [ {"name": "camera", "kind": "rgen", "file": "a.spv", "entry": "main",
 //                  "spec": {"0": 4, "1": 0.5, "2": true}}, … ],
 //     "groups": [ {"name": "camera", "general": "camera"},
-//                 {"name": "glass", "closestHit": "c", "anyHit": "a", "intersection": "i"} ] }
+//                 {"name": "glass", "closestHit": "c", "anyHit": "a", "intersection": "i"} ],
+//     "assume": ["opaque", …], "sceneProfile": "scene.json" }
 //
 // "name" defaults to the file's last component, "kind" to what the file says, "groups"
 // to what the command line would make of the stages. Files are relative to the JSON file.
@@ -35,6 +36,10 @@ class Reader {
                 stages = &check(member.value, Kind::Array);
             else if (member.name == "groups")
                 groups = &check(member.value, Kind::Array);
+            else if (member.name == "assume")
+                assume(check(member.value, Kind::Array));
+            else if (member.name == "sceneProfile")
+                plan_.scene_profiles.push_back(resolved(string(member.value)));
             else
                 unknown(member);
         }
@@ -81,6 +86,16 @@ class Reader {
         if (file == "-" || slash == std::string::npos || std::filesystem::path(file).is_absolute())
             return file;
         return path_.substr(0, slash + 1) + file;
+    }
+
+    void assume(const JsonValue& value) {
+        for (const JsonValue& item : value.items) {
+            const std::string& name = string(item);
+            bool known = false;
+            for (size_t i = 0; rtcc_assumption_name(i); ++i) known |= name == rtcc_assumption_name(i);
+            if (!known) json_error(path_, item.place, "no assumption is named \"" + name + "\"");
+            plan_.assume.push_back(name);
+        }
     }
 
     void stage(const JsonValue& value) {

@@ -34,6 +34,7 @@ struct Plan {
     std::vector<PlannedStage> stages;
     std::vector<PlannedGroup> groups;
     std::vector<std::string> description_files;  // the --pipeline files
+    std::vector<std::string> assume, scene_profiles;  // of pipeline files
 
     int find_stage(const std::string& name) const;
     // Throws InputError `where` + text when the name is taken.

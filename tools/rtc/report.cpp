@@ -67,7 +67,29 @@ std::string report_text(const rtcc_reflection& r, const std::string& module) {
             out += std::string(k ? ", " : ": ") + site.variables[k];
         out += "\n";
     }
+    if (r.fact_count) out += "facts:\n";
+    width = 0;
+    for (size_t i = 0; i < r.fact_count; ++i) width = widest(width, r.facts[i].name);
+    for (size_t i = 0; i < r.fact_count; ++i)
+        out += "  " + padded(r.facts[i].name, width) + "  " + padded(r.facts[i].state, 9) + r.facts[i].detail + "\n";
     return out;
+}
+
+std::string comparison_text(const rtcc_reflection& before, const rtcc_reflection& now) {
+    const auto frame_bytes = [](const rtcc_reflection& r) {
+        uint32_t bytes = 0;
+        for (size_t i = 0; i < r.trace_site_count; ++i) bytes += r.trace_sites[i].frame_bytes;
+        return bytes;
+    };
+    const auto line = [](const char* what, uint32_t a, uint32_t b) {
+        return std::string("  ") + padded(what, 24) + std::to_string(a) + " -> " + std::to_string(b) + "\n";
+    };
+    return "removed by what is known (--no-specialize -> this module):\n" +
+           line("instructions", before.instruction_count, now.instruction_count) +
+           line("states", before.state_count, now.state_count) +
+           line("frame bytes, all sites", frame_bytes(before), frame_bytes(now)) +
+           line("stack bytes a lane", before.stack_words * 4, now.stack_words * 4) +
+           line("scratch bytes a lane", before.scratch_words * 4, now.scratch_words * 4);
 }
 
 }  // namespace cli

@@ -8,5 +8,8 @@
 namespace cli {
 
 std::string report_text(const rtcc_reflection& reflection, const std::string& module);
+// What specialisation removed: `before` is the same pipeline without it.
+std::string comparison_text(const rtcc_reflection& before, const rtcc_reflection& now);
+
 
 }  // namespace cli

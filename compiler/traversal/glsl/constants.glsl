@@ -19,6 +19,13 @@ layout(constant_id = 0x80) const bool RTC_LINK_ANY_HIT = true; // false: every c
 layout(constant_id = 0x81) const bool RTC_LINK_AABBS = true; // false: no leaf holds AABBs
 layout(constant_id = 0x82) const bool RTC_LINK_TRIANGLES = true; // false: no leaf holds triangles
 layout(constant_id = 0x83) const bool RTC_LINK_RESUMABLE = true; // false: the step budget is ignored
+layout(constant_id = 0x90) const bool RTC_LINK_MIXED = true; // false: all instances hold the same kind
+layout(constant_id = 0x91) const bool RTC_LINK_NON_OPAQUE = true; // false: geometries and instances are opaque
+layout(constant_id = 0x92) const bool RTC_LINK_MASKS = true; // false: every instance mask is 0xff
+layout(constant_id = 0x93) const bool RTC_LINK_INSTANCE_FLAGS = true; // false: no instance has flags
+layout(constant_id = 0x94) const bool RTC_LINK_TRANSFORMS = true; // false: transforms are the identity
+layout(constant_id = 0x95) const bool RTC_LINK_LEVELS = true; // false: one instance at most
+layout(constant_id = 0x96) const uint RTC_LINK_ASSUMED = 0u; // assumptions that rays check as they begin
 
 const uint RTC_NONE = 0xffffffffu;
 

@@ -19,10 +19,15 @@ void rtc_choose_scale() {
     }
 }
 
+bool rtc_holds_aabbs(uint facts) {
+    return RTC_LINK_MIXED ? (facts & RTC_FACT_AABBS) != 0u : !RTC_LINK_TRIANGLES;
+}
+
 // Opacity and facing: instance flags, then ray flags (Vulkan: ray opacity
 // culling, ray face culling).
 uint rtc_level_bits(uint facts, uint instance_flags) {
-    uint bits = (facts & RTC_FACT_AABBS) != 0u ? RTC_LEVEL_AABBS : 0u;
+    uint bits = rtc_holds_aabbs(facts) ? RTC_LEVEL_AABBS : 0u;
+    instance_flags = RTC_LINK_INSTANCE_FLAGS ? instance_flags : 0u;
     if ((instance_flags & RTC_INSTANCE_FORCE_OPAQUE) != 0u) {
         bits |= RTC_LEVEL_FORCE | RTC_LEVEL_OPAQUE;
     } else if ((instance_flags & RTC_INSTANCE_FORCE_NO_OPAQUE) != 0u) {
@@ -45,7 +50,7 @@ uint rtc_level_bits(uint facts, uint instance_flags) {
 
 void rtc_level_setup() {
     rtc_trav_setup = 0u;
-    bool top = rtc_trav_instance == RTC_NONE;
+    bool top = RTC_LINK_LEVELS && rtc_trav_instance == RTC_NONE;
     bool enter = true;
     RtcBase base = rtc_ray_root;
     uint bits = 0u;
@@ -61,16 +66,19 @@ void rtc_level_setup() {
         record_index = (ids.w & 0x00ffffffu) + (rtc_ray_sbt_offset & 15u);
         bool aabbs = (bits & RTC_LEVEL_AABBS) != 0u;
         uint skip = aabbs ? RTC_RAY_SKIP_AABBS : RTC_RAY_SKIP_TRIANGLES;
-        enter = !rtc_is_null(base) && ((ids.z >> 24u) & rtc_ray_mask) != 0u && (rtc_ray_flags & skip) == 0u &&
+        uint mask = RTC_LINK_MASKS ? ids.z >> 24u : 0xffu;
+        enter = !rtc_is_null(base) && (mask & rtc_ray_mask) != 0u && (rtc_ray_flags & skip) == 0u &&
                 (aabbs ? RTC_LINK_AABBS : RTC_LINK_TRIANGLES);
-        vec4 r0 = uintBitsToFloat(rtc_quad(record, 0u));
-        vec4 r1 = uintBitsToFloat(rtc_quad(record, 1u));
-        vec4 r2 = uintBitsToFloat(rtc_quad(record, 2u));
-        o = rtc_transform_point(r0, r1, r2, o);
-        d = rtc_transform_vector(r0, r1, r2, d);
-        // A singular or overflowing transform leaves no ray to follow.
-        float largest = rtc_largest(d);
-        enter = enter && largest > 0.0 && rtc_finite(largest);
+        if (RTC_LINK_TRANSFORMS && (facts & RTC_FACT_IDENTITY_TRANSFORMS) == 0u) {
+            vec4 r0 = uintBitsToFloat(rtc_quad(record, 0u));
+            vec4 r1 = uintBitsToFloat(rtc_quad(record, 1u));
+            vec4 r2 = uintBitsToFloat(rtc_quad(record, 2u));
+            o = rtc_transform_point(r0, r1, r2, o);
+            d = rtc_transform_vector(r0, r1, r2, d);
+            // A singular or overflowing transform leaves no ray to follow.
+            float largest = rtc_largest(d);
+            enter = enter && largest > 0.0 && rtc_finite(largest);
+        }
     }
     if (enter) {
         uvec4 header = rtc_quad(base, RTC_HDR_NODES / 4u); // nodes, slots, node count, slot count

@@ -17,7 +17,28 @@ bool rtc_budget_spent() {
     return RTC_LINK_RESUMABLE && RTC_STEP_BUDGET != 0xffffffffu && rtc_turns >= RTC_STEP_BUDGET && rtc_trav_sp <= RTC_TRAVERSAL_STACK;
 }
 
+// Is the scene what the module was told that scenes are? If not, the lane ends here (rtc_refused): whatever
+// it would write, it would be wrong.
+uint rtc_refused;
+
+bool rtc_scene_accepted() {
+    bool accepted = true;
+    if (RTC_LINK_ASSUMED != 0u) {
+        uint facts = rtc_quad(rtc_ray_root, RTC_HDR_FACTS / 4u)[RTC_HDR_FACTS & 3u];
+        uint broken = RTC_LINK_ASSUMED & ~(facts ^ RTC_FACTS_OF_ABSENCE);
+        if (broken != 0u) {
+            uint word = RTC_HDR_OFFENDERS + uint(findLSB(broken));
+            rtc_error(RTC_LAUNCH_ERROR_ASSUMPTION, broken & (~broken + 1u),
+                      rtc_quad(rtc_ray_root, word / 4u)[word & 3u]);
+            rtc_refused = 1u;
+            accepted = false;
+        }
+    }
+    return accepted;
+}
+
 void rtc_trace_begin() {
+    rtc_refused = 0u;
     rtc_hit_t = rtc_ray_tmax;
     rtc_hit_kind = 0u;
     rtc_hit_instance = RTC_NONE;
@@ -50,13 +71,15 @@ void rtc_trace_begin() {
         uvec4 header = rtc_quad(rtc_ray_root, 0u); // self low, self high, magic, kind
         if (header.z != RTC_AS_MAGIC || header.w != RTC_AS_KIND_TOP) {
             rtc_error(RTC_LAUNCH_ERROR_ABI, header.z, header.w);
-        } else {
-            rtc_trav_setup = 1u;
-            rtc_trav_cur = 0u;
+        } else if (rtc_scene_accepted()) {
             // A top level of one instance has nothing to search: the walk starts inside.
             uint single = rtc_quad(rtc_ray_root, RTC_HDR_SINGLE_INSTANCE / 4u)[RTC_HDR_SINGLE_INSTANCE & 3u];
             if (single != 0u) {
                 rtc_trav_instance = single - 1u;
+            }
+            if (RTC_LINK_LEVELS || single != 0u) {
+                rtc_trav_setup = 1u;
+                rtc_trav_cur = 0u;
             }
         }
     }
@@ -97,7 +120,7 @@ void rtc_trace_accept() {
 
 // Effective opacity of a slot, 2 when the ray flags drop it.
 uint rtc_opacity(uint slot_flags) {
-    uint opaque = (slot_flags & RTC_SLOT_OPAQUE) != 0u ? 1u : 0u;
+    uint opaque = !RTC_LINK_NON_OPAQUE || (slot_flags & RTC_SLOT_OPAQUE) != 0u ? 1u : 0u;
     if ((rtc_trav_bits & RTC_LEVEL_FORCE) != 0u) {
         opaque = (rtc_trav_bits & RTC_LEVEL_OPAQUE) != 0u ? 1u : 0u;
     }
@@ -263,13 +286,13 @@ uint rtc_trace_step() {
                     // Out of nodes. An instance goes back to the top level, whose data is made
                     // anew.
                     // Nothing waits there when it was the last entry: the ray is finished.
-                    bool top = rtc_trav_instance == RTC_NONE || rtc_trav_floor == 0u;
+                    bool top = !RTC_LINK_LEVELS || rtc_trav_instance == RTC_NONE || rtc_trav_floor == 0u;
                     rtc_trav_cur = top ? RTC_REF_DONE : RTC_REF_POP;
                     rtc_trav_instance = RTC_NONE;
                     rtc_trav_floor = 0u;
                     rtc_trav_setup = top ? 0u : 2u;
                     result = top ? RTC_STEP_DONE : RTC_STEP_RUNNING;
-                } else if (rtc_trav_instance == RTC_NONE) {
+                } else if (RTC_LINK_LEVELS && rtc_trav_instance == RTC_NONE) {
                     rtc_trav_instance = rtc_trav_cur & RTC_REF_INDEX_MASK;
                     rtc_trav_floor = rtc_trav_sp;
                     rtc_trav_cur = 0u;

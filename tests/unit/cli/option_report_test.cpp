@@ -90,7 +90,9 @@ TEST_F(Report, ReportNamesWhatIsSaved) {
 
 TEST_F(Report, ReportOfAFinishedModule) {
     ASSERT_EQ(rtc("camera.rgen sky.rmiss -o p.spv --report").status, 0);
-    EXPECT_EQ(rtc("p.spv --report").out, rtc("camera.rgen sky.rmiss -o p.spv --report").out);
+    // All but the comparison with the pipeline linked another way, which a module does not know.
+    const std::string linked = rtc("camera.rgen sky.rmiss -o p.spv --report").out;
+    EXPECT_EQ(rtc("p.spv --report").out, linked.substr(0, linked.find("removed by what is known")));
 }
 
 TEST_F(Report, ReportLeavesStandardOutputToTheModule) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "core_test_util.h"
+#include "rtc/abi.h"
 
 namespace rtc::test {
 namespace {
@@ -283,6 +284,9 @@ TEST(Diagnostics, Pipelines) {
     options.max_recursion_depth = 32;
     expect_error(link({raygen_stage}, options), "recursion-limit");
     expect_error(link({{StageKind::RayGen, raygen_stage.spirv, "other"}}), "entry-point-missing");
+    LinkOptions both;
+    both.assumptions = RTC_FACT_HAS_TRIANGLES | RTC_FACT_HAS_AABBS;
+    expect_error(link({raygen_stage}, both), "assumption-conflict");
 }
 
 TEST(Diagnostics, Groups) {
