@@ -10,6 +10,7 @@ int main(int argc, char** argv) {
     rtc::bench::add_compile_command(app);
 #ifdef RTC_BENCH_TRACE
     rtc::bench::add_trace_command(app);
+    rtc::bench::add_specialise_command(app);
 #endif
     try {
         CLI11_PARSE(app, argc, argv);

@@ -151,13 +151,16 @@ const std::vector<uint32_t>& ModuleCache::get(const std::string& workload, const
     const bool resumable = variant.resumable < 0 ? device_needs_resumable : variant.resumable != 0;
     const std::string stem = workload + "-" + fs::path(pass.pipeline.shaders[0].file).stem().string();
     const std::string key = stem + (resumable ? " resumable" : "") + (variant.optimize ? " O" : "") +
-                            (variant.ext_dialect ? " ext" : "") + " " + variant.modules;
+                            (variant.ext_dialect ? " ext" : "") + (variant.specialize ? "" : " whole") + " " +
+                            variant.assume + " " + variant.modules;
     if (const auto found = modules_.find(key); found != modules_.end()) return found->second;
     if (!variant.modules.empty())
         return modules_[key] = tools::read_words_file(variant.modules + "/" + stem + ".spv");
     tools::CompileOptions options;
     options.optimize = variant.optimize;
     options.resumable = resumable;
+    options.specialize = variant.specialize;
+    options.assume = variant.assume;
     std::vector<uint32_t> words = tools::compile_job(pass.pipeline, options).words;
     if (!save_folder_.empty()) {
         fs::create_directories(save_folder_);

@@ -1,5 +1,6 @@
 #include "trace_variant.h"
 
+#include <algorithm>
 #include <functional>
 #include <map>
 #include <sstream>
@@ -48,6 +49,12 @@ const std::map<std::string, Setter>& setters() {
         {"build", [](auto& v, auto& key, auto& value) { v.fast_build = choice(key, value, {"trace", "fast"}); }},
         {"resumable", [](auto& v, auto& key, auto& value) { v.resumable = int(choice(key, value, {"0", "1"})); }},
         {"optimize", [](auto& v, auto& key, auto& value) { v.optimize = choice(key, value, {"0", "1"}); }},
+        {"specialize", [](auto& v, auto& key, auto& value) { v.specialize = choice(key, value, {"0", "1"}); }},
+        {"assume",
+         [](auto& v, auto&, auto& value) {
+             v.assume = value;
+             std::replace(v.assume.begin(), v.assume.end(), '+', ',');
+         }},
         {"dialect", [](auto& v, auto& key, auto& value) { v.ext_dialect = choice(key, value, {"nv", "ext"}); }},
         {"modules", [](auto& v, auto&, auto& value) { v.modules = value; }},
     };
@@ -77,7 +84,7 @@ TraceVariant parse_variant(const std::string& text) {
 const char* variant_help() {
     return "a column of rtc, as KEY=VALUE,... (may be repeated; none: the device's defaults). Keys: name=TEXT, "
            "fetch=texel|storage, loop=if|while, stack=ENTRIES in shared memory (0: local), workgroup=LANES, "
-           "budget=TURNS before a lane suspends (0: never), build=trace|fast, resumable=0|1, optimize=0|1, "
+           "budget=TURNS before a lane suspends (0: never), build=trace|fast, resumable=0|1, optimize=0|1, specialize=0|1, assume=NAME+NAME, "
            "dialect=nv|ext, modules=FOLDER written by --save-modules";
 }
 

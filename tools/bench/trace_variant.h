@@ -15,6 +15,8 @@ struct TraceVariant {
     int resumable = -1;  // -1: as the device needs
     bool optimize = true;
     bool ext_dialect = false;
+    bool specialize = true;  // false: nothing is removed from the modules
+    std::string assume;      // promises about the scene, separated by commas
     std::string modules;  // folder of modules made by --save-modules, instead of compiling
 };
 

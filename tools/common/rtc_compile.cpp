@@ -36,6 +36,8 @@ Options make_options(const JobPipeline& pipeline, const CompileOptions& wanted) 
             "the optimisation level");
     require(rtcc_options_set_debug_info(options.get(), wanted.debug_info), "debug info");
     require(rtcc_options_set_resumable(options.get(), wanted.resumable), "resumable");
+    require(rtcc_options_set_specialize(options.get(), wanted.specialize), "specialize");
+    require(rtcc_options_assume(options.get(), wanted.assume.c_str()), "an assumption");
     require(rtcc_options_set_max_recursion_depth(options.get(), pipeline.max_recursion),
             "the recursion depth");
     require(rtcc_options_set_max_callable_depth(options.get(), pipeline.max_callable_depth),

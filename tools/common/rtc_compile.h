@@ -13,6 +13,8 @@ struct CompileOptions {
     bool debug_info = false;
     // Lanes can suspend; needed on devices that end long loops (RtrPhysicalDeviceSupport).
     bool resumable = true;
+    bool specialize = true;  // remove what cannot be needed
+    std::string assume;      // promises about scenes, as rtc --assume takes them
     int reserved_set = -1;
     uint32_t reserved_binding = 0;
 };
