@@ -98,7 +98,8 @@ Vec3 get_vertex(const Geometry& g, uint32_t i) {
 uint32_t get_index(const Geometry& g, uint32_t i) {
     if (g.index_type == VK_INDEX_TYPE_NONE_NV) return i;
     uint32_t value = 0;
-    const uint32_t bytes = g.index_type == VK_INDEX_TYPE_UINT16 ? 2 : 4;
+    const uint32_t bytes =
+        g.index_type == VK_INDEX_TYPE_UINT8_EXT ? 1 : (g.index_type == VK_INDEX_TYPE_UINT16 ? 2 : 4);
     std::memcpy(&value, g.indices.data() + g.index_offset + size_t(i) * bytes, bytes);
     return value;
 }
@@ -182,8 +183,10 @@ void make_triangles(Geometry& g, Random& random, uint64_t most) {
     if (kind == 2 && indexed) g.vertex_count = uint32_t(count / 2 + 3);
     if (indexed) {
         const bool narrow = g.vertex_count <= 65536 && chance(random, 0.5);
-        const uint32_t bytes = narrow ? 2 : 4;
-        g.index_type = narrow ? VK_INDEX_TYPE_UINT16 : VK_INDEX_TYPE_UINT32;
+        const bool bytewise = g.vertex_count <= 256 && chance(random, 0.3);
+        const uint32_t bytes = bytewise ? 1 : (narrow ? 2 : 4);
+        g.index_type =
+            bytewise ? VK_INDEX_TYPE_UINT8_EXT : (narrow ? VK_INDEX_TYPE_UINT16 : VK_INDEX_TYPE_UINT32);
         g.index_offset = uint32_t(below(random, 4)) * bytes;
         g.index_count = uint32_t(3 * count);
         g.indices.resize(g.index_offset + size_t(g.index_count) * bytes + 4);

@@ -266,13 +266,12 @@ VkDeviceSize World::query(RtrAccelerationStructure structure, VkQueryType type) 
 }
 
 // Replaces the structure by its copy.
-void World::copy(Structure& s, VkAccelerationStructureTypeNV type, VkBuildAccelerationStructureFlagsNV flags,
-                 bool compact) {
+void World::copy(Structure& s, const VkAccelerationStructureInfoNV& info, bool compact) {
     const VkDeviceSize size =
         compact ? query(s.handle, VK_QUERY_TYPE_ACCELERATION_STRUCTURE_COMPACTED_SIZE_NV) : s.size;
     if (size > s.size)
         throw Error("the compacted size " + std::to_string(size) + " is above " + std::to_string(s.size));
-    Structure fresh = create(info_of(type, flags), size);
+    Structure fresh = create(info, info.geometryCount ? 0 : size);
     if (!fresh.handle) return;
     record([&](RtrRecorder recorder) {
         device_.check(rtrCmdCopyAccelerationStructure(recorder, fresh.handle, s.handle,
@@ -340,9 +339,11 @@ void World::change_bottom() {
     Bottom& b = chosen->second;
     in_use_ = chosen->first;
     const bool updatable = (b.flags & VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV) && !b.copied;
-    switch (below(random_, 6)) {
+    switch (below(random_, 8)) {
         case 0:
         case 1:
+        case 6:
+        case 7:
             if (!updatable) break;
             move_content(b.content, random_);
             history_ += " update";
@@ -374,8 +375,14 @@ void World::change_bottom() {
         case 4: {
             const bool compact =
                 (b.flags & VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_COMPACTION_BIT_NV) && chance(random_, 0.7);
-            copy(b.structure, kBottom, b.flags, compact);
-            b.copied = true;
+            // A clone created like its source can be built and updated as that.
+            const Inputs inputs(device_.context, b.content);
+            VkAccelerationStructureInfoNV like = info_of(kBottom, b.flags);
+            like.geometryCount = uint32_t(inputs.geometries.size());
+            like.pGeometries = inputs.geometries.data();
+            const bool same = !compact && !b.copied && chance(random_, 0.7);
+            copy(b.structure, same ? like : info_of(kBottom, b.flags), compact);
+            b.copied = b.copied || !same;
             break;
         }
         default:
@@ -498,7 +505,7 @@ void World::make_top() {
     in_use_ = -2;  // what it refers to stays
     if (chance(random_, 0.3)) {
         const bool compact = (top_->flags & VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_COMPACTION_BIT_NV) != 0;
-        copy(top_->structure, kTop, top_->flags, compact);
+        copy(top_->structure, info_of(kTop, top_->flags), compact);
         top_->copied = true;
     } else if (chance(random_, 0.2)) {
         serialise(top_->structure, kTop, top_->flags, top_.get());

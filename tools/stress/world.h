@@ -77,8 +77,8 @@ class World {
     VkDeviceSize scratch_size(RtrAccelerationStructure structure, bool update);
     void build(Bottom& bottom, bool update, Structure* target);
     VkDeviceSize query(RtrAccelerationStructure structure, VkQueryType type);
-    void copy(Structure& structure, VkAccelerationStructureTypeNV type,
-              VkBuildAccelerationStructureFlagsNV flags, bool compact);
+    // `info` with geometries: created like the source; without: by size.
+    void copy(Structure& structure, const VkAccelerationStructureInfoNV& info, bool compact);
     void serialise(Structure& structure, VkAccelerationStructureTypeNV type,
                    VkBuildAccelerationStructureFlagsNV flags, const Top* top);
     void add_bottom();
