@@ -266,12 +266,13 @@ VkDeviceSize World::query(RtrAccelerationStructure structure, VkQueryType type) 
 }
 
 // Replaces the structure by its copy.
-void World::copy(Structure& s, const VkAccelerationStructureInfoNV& info, bool compact) {
+void World::copy(Structure& s, const VkAccelerationStructureInfoNV& info, Copy how) {
+    const bool compact = how == Copy::Compact;
     const VkDeviceSize size =
         compact ? query(s.handle, VK_QUERY_TYPE_ACCELERATION_STRUCTURE_COMPACTED_SIZE_NV) : s.size;
     if (size > s.size)
         throw Error("the compacted size " + std::to_string(size) + " is above " + std::to_string(s.size));
-    Structure fresh = create(info, info.geometryCount ? 0 : size);
+    Structure fresh = create(info, how == Copy::CloneOfItsKind ? 0 : size);
     if (!fresh.handle) return;
     record([&](RtrRecorder recorder) {
         device_.check(rtrCmdCopyAccelerationStructure(recorder, fresh.handle, s.handle,
@@ -381,7 +382,8 @@ void World::change_bottom() {
             like.geometryCount = uint32_t(inputs.geometries.size());
             like.pGeometries = inputs.geometries.data();
             const bool same = !compact && !b.copied && chance(random_, 0.7);
-            copy(b.structure, same ? like : info_of(kBottom, b.flags), compact);
+            copy(b.structure, same ? like : info_of(kBottom, b.flags),
+                 compact ? Copy::Compact : (same ? Copy::CloneOfItsKind : Copy::Clone));
             b.copied = b.copied || !same;
             break;
         }
@@ -505,7 +507,7 @@ void World::make_top() {
     in_use_ = -2;  // what it refers to stays
     if (chance(random_, 0.3)) {
         const bool compact = (top_->flags & VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_COMPACTION_BIT_NV) != 0;
-        copy(top_->structure, info_of(kTop, top_->flags), compact);
+        copy(top_->structure, info_of(kTop, top_->flags), compact ? Copy::Compact : Copy::Clone);
         top_->copied = true;
     } else if (chance(random_, 0.2)) {
         serialise(top_->structure, kTop, top_->flags, top_.get());

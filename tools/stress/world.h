@@ -77,8 +77,8 @@ class World {
     VkDeviceSize scratch_size(RtrAccelerationStructure structure, bool update);
     void build(Bottom& bottom, bool update, Structure* target);
     VkDeviceSize query(RtrAccelerationStructure structure, VkQueryType type);
-    // `info` with geometries: created like the source; without: by size.
-    void copy(Structure& structure, const VkAccelerationStructureInfoNV& info, bool compact);
+    enum class Copy { Clone, CloneOfItsKind, Compact };  // of its kind: created like the source, not by size
+    void copy(Structure& structure, const VkAccelerationStructureInfoNV& info, Copy how);
     void serialise(Structure& structure, VkAccelerationStructureTypeNV type,
                    VkBuildAccelerationStructureFlagsNV flags, const Top* top);
     void add_bottom();
