@@ -33,6 +33,14 @@ static inline uint32_t rtr_index_size(VkIndexType type) {
     return type == VK_INDEX_TYPE_UINT8_EXT ? 1 : type == VK_INDEX_TYPE_UINT16 ? 2 : 4;
 }
 
+/* Geometry index and flags as slots hold them. */
+static inline uint32_t rtr_slot_word(const VkGeometryNV* g, uint32_t index) {
+    uint32_t word = index;
+    if (g->flags & VK_GEOMETRY_OPAQUE_BIT_NV) word |= RTC_SLOT_OPAQUE;
+    if (g->flags & VK_GEOMETRY_NO_DUPLICATE_ANY_HIT_INVOCATION_BIT_NV) word |= RTC_SLOT_NO_DUPLICATE;
+    return word;
+}
+
 /* How a vertex format is read; false when the extension does not list it. */
 bool rtr_vertex_format(VkFormat format, uint32_t* code, uint32_t* bytes, uint32_t* component_bytes);
 

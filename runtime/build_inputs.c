@@ -60,13 +60,6 @@ static VkResult too_large(RtrBuild* b, const char* what, uint32_t g, VkDeviceSiz
                      (unsigned long long)bytes, b->device->limits.maxStorageBufferRange);
 }
 
-static uint32_t slot_flags(const VkGeometryNV* g, uint32_t index) {
-    uint32_t word = index;
-    if (g->flags & VK_GEOMETRY_OPAQUE_BIT_NV) word |= RTC_SLOT_OPAQUE;
-    if (g->flags & VK_GEOMETRY_NO_DUPLICATE_ANY_HIT_INVOCATION_BIT_NV) word |= RTC_SLOT_NO_DUPLICATE;
-    return word;
-}
-
 static VkResult triangles(RtrBuild* b, uint32_t g, uint32_t first, uint32_t count, RtrInputFunction emit) {
     const VkGeometryTrianglesNV* t = &b->geometries[g].geometry.triangles;
     const VkDeviceSize limit = b->device->limits.maxStorageBufferRange - 1024u;
@@ -111,7 +104,7 @@ static VkResult triangles(RtrBuild* b, uint32_t g, uint32_t first, uint32_t coun
         b->push.count = n;
         b->push.first = first + at;
         b->push.primitive_base = at;
-        b->push.geometry = slot_flags(&b->geometries[g], g);
+        b->push.geometry = rtr_slot_word(&b->geometries[g], g);
         b->push.data_stride = (uint32_t)t->vertexStride;
         b->push.vertex_format = code;
         if ((r = bind_inputs(b, data, index, transform)) != VK_SUCCESS || (r = emit(b)) != VK_SUCCESS)
@@ -164,7 +157,7 @@ VkResult rtr_for_each_input(RtrBuild* b, RtrInputFunction emit) {
             if (!boxes->aabbData)
                 return rtr_error(b->device, VK_ERROR_VALIDATION_FAILED_EXT, "geometry-data",
                                  "geometry %u: aabbData is VK_NULL_HANDLE", g);
-            r = records(b, boxes->aabbData, boxes->offset, boxes->stride, 24, slot_flags(geometry, g), first,
+            r = records(b, boxes->aabbData, boxes->offset, boxes->stride, 24, rtr_slot_word(geometry, g), first,
                         count, count, emit);
         }
         if (r != VK_SUCCESS) return r;

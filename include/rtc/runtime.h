@@ -417,6 +417,29 @@ RTR_API VkResult rtrCmdBuildAccelerationStructure(RtrRecorder recorder,
                                                   RtrAccelerationStructure src, VkBuffer scratch,
                                                   VkDeviceSize scratchOffset);
 
+/* Where a geometry's data lies for a build on the host, in place of the buffers that its
+ * VkGeometryNV names (which are ignored). Its offsets count from these pointers. */
+typedef struct RtrHostGeometry {
+    const void* pVertexData;
+    const void* pIndexData;     /* NULL without indices */
+    const void* pTransformData; /* NULL: none */
+    const void* pAabbData;
+} RtrHostGeometry;
+
+/* Builds a bottom level on the host, by the surface area heuristic: slower than the device
+ * but, for static geometry, a better tree. pHostGeometries has info's geometryCount elements.
+ * dst is bound; pMemory receives its block: dst's place in mapped memory, or as many bytes
+ * (memory requirements of the object) elsewhere, which the application then copies to dst's
+ * place. Everything after works as with a structure built on the device: instances, copies,
+ * compaction, updates. Uses one thread, and host memory of 32 bytes a primitive.
+ * Thread-safe for different dst. Counterpart: vkBuildAccelerationStructuresKHR.
+ * Errors: VALIDATION_FAILED for top levels, counts, missing pointers; OUT_OF_HOST_MEMORY. */
+RTR_API VkResult rtrBuildAccelerationStructureOnHost(RtrDevice device,
+                                                     const VkAccelerationStructureInfoNV* pInfo,
+                                                     const RtrHostGeometry* pHostGeometries,
+                                                     RtrAccelerationStructure dst, void* pMemory,
+                                                     const VkAllocationCallbacks* pAllocator);
+
 /* Clone or compact. dst must be large enough: for COMPACT created with the
  * compactedSize that the query returned. Both must be in the same heap, or both be bound to
  * buffers.
