@@ -45,6 +45,13 @@ class RtcRun(unittest.TestCase):
         self.fails("NAME=VALUE", *HELLO, "--bind", "0.1")
         self.fails("WIDTHxHEIGHT", *HELLO, "--size", "wide")
         self.fails("is khr or nv", *HELLO, "--native", "dxr")
+        for size in ("0x5", "-3", "5x5x5x5", "5x", "x5", "99999999999"):
+            self.fails("WIDTHxHEIGHT", *HELLO, "--size=" + size)
+        self.fails("no stage has a specialisation constant 'foo'", *HELLO, "--spec", "foo=1")
+        self.fails("outputs are written as", *HELLO, "-o", "out.tiff")
+        self.fails("No such file or directory", *HELLO, "-o", "/nowhere/out.png")
+        self.fails("maxImageDimension2D", *HELLO, "--size", "999999x2")
+        self.fails("rtc-run: error: ", *HELLO, "--repeat", "often")
         self.fails("unknown image pattern", *HELLO, "--bind", "0.1=pattern:nothing")
 
     def test_bad_shaders(self):

@@ -1,10 +1,10 @@
 // rtc-accuracy: what a tier leaks, how exact it is, what it costs.
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "command_line.h"
 #include "error.h"
 #include "experiments.h"
 
@@ -174,7 +174,7 @@ int run(int argc, char** argv) {
     app.add_flag("--while-while", while_while, "loop form");
     app.add_flag("--storage", storage, "fetch nodes from a storage buffer");
     app.add_option("--shared-stack", shared_stack, "stack entries in shared memory");
-    CLI11_PARSE(app, argc, argv);
+    if (const int status = rtc::tools::parse_command_line(app, "rtc-accuracy", argc, argv); status >= 0) return status;
     if (tiers == std::vector<std::string>{"all"}) tiers = {"watertight", "fast", "contracted"};
     if (axes == std::vector<std::string>{"all"}) axes = axis_names();
     if (axes == std::vector<std::string>{"none"}) axes.clear();

@@ -7,9 +7,12 @@
 #include <algorithm>
 #include <bit>
 #include <cctype>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 
@@ -84,6 +87,16 @@ Picture read_pfm(const std::string& path) {
 }
 
 }  // namespace
+
+void require_writable(const std::string& path) {
+    std::error_code ignored;
+    const bool existed = std::filesystem::exists(path, ignored);
+    if (std::filesystem::is_directory(path, ignored)) throw Error("cannot write " + path + ": it is a folder");
+    errno = 0;
+    const bool opened = std::ofstream(path, std::ios::binary | std::ios::app).is_open();
+    if (!opened) throw Error("cannot write " + path + ": " + std::strerror(errno ? errno : EIO));
+    if (!existed) std::filesystem::remove(path, ignored);
+}
 
 bool can_write_picture(const std::string& path) {
     const std::string extension = extension_of(path);

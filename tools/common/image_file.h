@@ -21,6 +21,9 @@ struct Picture {
 
 // Whether write_picture knows the extension; asked before hours of work.
 bool can_write_picture(const std::string& path);
+// Throws Error unless a file can be made or replaced there; leaves what is there as it is. Asked before the
+// work, so that a wrong folder costs nothing.
+void require_writable(const std::string& path);
 // The extension chooses: .png (clamped, sRGB curve; `srgb` false writes values * 255 as they are),
 // .pfm (1 or 3 channels; a fourth is dropped), .exr (32-bit floats). Throws Error.
 void write_picture(const std::string& path, const Picture& picture, bool srgb = true);

@@ -165,11 +165,24 @@ Image::Image(const Context& context, const ImageDesc& desc_) : desc(desc_), devi
     info.samples = VK_SAMPLE_COUNT_1_BIT;
     info.tiling = VK_IMAGE_TILING_OPTIMAL;
     info.usage = desc.usage | VK_IMAGE_USAGE_TRANSFER_SRC_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT;
-    check(vkCreateImage(device_, &info, nullptr, &handle), "vkCreateImage");
+    const VkPhysicalDeviceLimits& limits = context.properties.limits;
+    const bool solid = info.imageType == VK_IMAGE_TYPE_3D;
+    const uint32_t limit = solid ? limits.maxImageDimension3D : limits.maxImageDimension2D;
+    const std::string size = std::to_string(desc.extent.width) + "x" + std::to_string(desc.extent.height) +
+                             (solid ? "x" + std::to_string(desc.extent.depth) : std::string());
+    if (desc.extent.width > limit || desc.extent.height > limit || desc.extent.depth > limit)
+        throw Error("an image of " + size + " texels: the device's " +
+                    (solid ? "maxImageDimension3D" : "maxImageDimension2D") + " is " + std::to_string(limit));
+    auto check_memory = [&](VkResult result, const char* call) {
+        if (result == VK_ERROR_OUT_OF_DEVICE_MEMORY || result == VK_ERROR_OUT_OF_HOST_MEMORY)
+            throw Error("the device has no memory for an image of " + size + " texels (" + call + ")");
+        check(result, call);
+    };
+    check_memory(vkCreateImage(device_, &info, nullptr, &handle), "vkCreateImage");
     VkMemoryRequirements needed{};
     vkGetImageMemoryRequirements(device_, handle, &needed);
     memory = allocate(context, needed, MemoryKind::Device, false);
-    check(vkBindImageMemory(device_, handle, memory, 0), "vkBindImageMemory");
+    check_memory(vkBindImageMemory(device_, handle, memory, 0), "vkBindImageMemory");
 
     VkImageViewCreateInfo viewInfo{};
     viewInfo.sType = VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO;

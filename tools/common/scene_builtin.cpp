@@ -107,8 +107,8 @@ Scene spheres() {
     grow(glm::mat4(1.0f), 0);
     checkerboard(scene, 12.0f, 24, -1.0f, light, dark);
     scene.lights.push_back({{4, 6, 5}, glm::vec3(220.0f)});
-    scene.sky_low = {0.35f, 0.32f, 0.3f};
-    scene.sky_high = {0.15f, 0.3f, 0.65f};
+    scene.sky_low = {0.62f, 0.7f, 0.8f};
+    scene.sky_high = {0.06f, 0.16f, 0.5f};
     scene.camera = {{2.6f, 2.0f, 4.2f}, {0, 0.25f, 0}, {0, 1, 0}, glm::radians(40.0f)};
     scene.finish(true);
     return scene;
@@ -217,9 +217,9 @@ Scene bunny() {
     }
     scene.materials.clear();
     scene.lights.clear();
-    const uint32_t clay = add_material(scene, {0.72f, 0.42f, 0.26f}, 0.0f, 0.45f);
-    const uint32_t stone = add_material(scene, {0.62f, 0.62f, 0.6f});
-    const uint32_t lamp = add_material(scene, glm::vec3(0.0f), 0, 1, {22.0f, 20.0f, 17.0f});
+    const uint32_t clay = add_material(scene, {0.62f, 0.24f, 0.11f}, 0.0f, 0.35f);
+    const uint32_t stone = add_material(scene, {0.5f, 0.5f, 0.48f});
+    const uint32_t lamp = add_material(scene, glm::vec3(0.0f), 0, 1, {30.0f, 26.0f, 20.0f});
     glm::vec3 low, high;
     scene.bounds(low, high);
     const float size = high.y - low.y;
@@ -233,8 +233,8 @@ Scene bunny() {
     place(scene, add_mesh(scene, make_quad({-6, 0, -6}, {0, 0, 12}, {12, 0, 0}, stone), "floor"));
     place(scene,
           add_mesh(scene, make_quad({-1.9f, 2.2f, 0.2f}, {0.9f, 0.35f, 0}, {0, 0, 0.9f}, lamp), "lamp"));
-    scene.sky_low = {0.22f, 0.24f, 0.28f};
-    scene.sky_high = {0.35f, 0.48f, 0.7f};
+    scene.sky_low = {0.2f, 0.27f, 0.4f};
+    scene.sky_high = {0.2f, 0.33f, 0.6f};
     scene.camera = {{0.25f, 0.85f, 2.35f}, {-0.02f, 0.46f, 0}, {0, 1, 0}, glm::radians(32.0f)};
     scene.name = "builtin:bunny";
     scene.finish(true);

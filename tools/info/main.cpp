@@ -1,8 +1,7 @@
 // rtc-info: does rtc run here, in which mode, what is missing, how should modules be specialised.
-#include <CLI/CLI.hpp>
-
 #include <cstdio>
 
+#include "command_line.h"
 #include "error.h"
 #include "report.h"
 
@@ -14,7 +13,7 @@ int main(int argc, char** argv) {
     app.add_option("--device", wanted, "only this one: index or part of the name");
     app.add_flag("--json", json, "as JSON");
     app.add_flag("--no-probe", no_probe, "do not run the float probe on the devices");
-    CLI11_PARSE(app, argc, argv);
+    if (const int status = rtc::tools::parse_command_line(app, "rtc-info", argc, argv); status >= 0) return status;
     return run_program("rtc-info", [&] {
         const DeviceList list;
         std::vector<DeviceReport> reports;

@@ -1,17 +1,16 @@
 // rtc-render: draws scenes with ray tracing shaders on plain Vulkan compute.
-#include <CLI/CLI.hpp>
-
 #include <cstdio>
 #include <fstream>
 
+#include "command_line.h"
 #include "demo.h"
 #include "error.h"
 #include "image_file.h"
 #include "renderer.h"
 #ifdef RTC_RENDER_NATIVE
 #include "comparison.h"
-#include "recorded.h"
 #include "native_renderer.h"
+#include "recorded.h"
 #endif
 
 namespace {
@@ -156,8 +155,11 @@ int main(int argc, char** argv) {
     app.add_option("--ao-radius", render.settings.ao_radius, "0: a quarter of the scene");
     app.add_option("--eye", arguments.eye, "camera position: X Y Z")->expected(3);
     app.add_option("--target", arguments.target, "what it looks at: X Y Z")->expected(3);
-    app.add_option("--fov", arguments.field_of_view, "vertical field of view, degrees");
-    app.add_option("--exposure", arguments.exposure, "factor on the picture")->capture_default_str();
+    app.add_option("--fov", arguments.field_of_view, "vertical field of view, degrees")
+        ->check(number_between(0.01, 179));
+    app.add_option("--exposure", arguments.exposure, "factor on the picture")
+        ->capture_default_str()
+        ->check(number_between(1e-6, 1e6));
     app.add_option("--dialect", arguments.dialect, "shaders to compile: nv or ext")
         ->capture_default_str()
         ->check(CLI::IsMember({"nv", "ext"}));
@@ -177,13 +179,15 @@ int main(int argc, char** argv) {
     app.add_option("--json", arguments.json, "with --compare: write the figures to this file");
     app.add_flag("--demo", arguments.demo, "draw the three demo pictures");
     app.add_option("--out-dir", arguments.demo_folder, "where --demo writes")->default_str("out/demo");
-    CLI11_PARSE(app, argc, argv);
+    if (const int status = rtc::tools::parse_command_line(app, "rtc-render", argc, argv); status >= 0) return status;
     if (arguments.demo_folder.empty()) arguments.demo_folder = "out/demo";
     return run_program("rtc-render", [&] {
         if (arguments.output.empty() && !arguments.demo && !arguments.compare)
             throw Error("-o FILE, --compare or --demo is needed");
         if (!arguments.output.empty() && !can_write_picture(arguments.output))
             throw Error(arguments.output + ": pictures are written as .png, .exr or .pfm");
+        if (!arguments.output.empty()) require_writable(arguments.output);
+        if (!arguments.json.empty()) require_writable(arguments.json);
         if (arguments.classify && !arguments.compare) throw Error("--classify needs --compare");
         if (!arguments.json.empty() && !arguments.compare) throw Error("--json needs --compare");
         if (arguments.compare && arguments.native.empty()) throw Error("--compare needs --native=nv or khr");

@@ -74,7 +74,11 @@ void add_lights(const Scene& scene, SceneTables& tables) {
 void add_camera(const Scene& scene, float aspect, FrameBlock& frame) {
     const Camera& camera = scene.camera;
     const glm::vec3 forward = glm::normalize(camera.target - camera.eye);
-    const glm::vec3 right = glm::normalize(glm::cross(forward, camera.up));
+    if (!(glm::length(forward) > 0.5f)) throw Error("the camera's eye and target are the same point");
+    // Straight up or down: any side will do.
+    const bool upright = glm::length(glm::cross(forward, glm::normalize(camera.up))) > 1e-4f;
+    const glm::vec3 up_hint = upright ? camera.up : glm::vec3(0, 0, -1);
+    const glm::vec3 right = glm::normalize(glm::cross(forward, up_hint));
     const glm::vec3 up = glm::cross(right, forward);
     const float height = std::tan(0.5f * camera.fov_y);
     frame.eye = glm::vec4(camera.eye, 0.0f);

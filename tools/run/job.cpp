@@ -266,6 +266,13 @@ void compile(Job& job, Dialect dialect, bool debug_info) {
         job.modules.push_back(std::move(module));
         job.pipeline.shaders.push_back(std::move(shader));
     }
+    for (const auto& [key, value] : job.constants.items()) {
+        bool known = false;
+        for (const Module& module : job.modules)
+            for (const SpecConstant& constant : module.constants)
+                known = known || key == std::to_string(constant.id) || key == constant.name;
+        if (!known) throw Error("no stage has a specialisation constant '" + key + "'");
+    }
     for (size_t i = 0; i < job.sources.size(); ++i) job.sources[i].stage = job.pipeline.shaders[i].stage;
     make_groups(job);
     // A shader that a trace called and that traces itself may recurse: give it some levels.

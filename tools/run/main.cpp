@@ -1,8 +1,8 @@
 // rtc-run: runs any ray tracing pipeline without an engine around it.
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
 
+#include "command_line.h"
 #include "backend.h"
 #include "report.h"
 
@@ -119,13 +119,16 @@ Job job_of(const CommandLine& c) {
     }
     if (!c.size.empty()) {
         auto parts = split_all(c.size, 'x');
-        try {
-            job.width = uint32_t(std::stoul(parts.at(0)));
-            job.height = parts.size() > 1 ? uint32_t(std::stoul(parts[1])) : 1;
-            job.depth = parts.size() > 2 ? uint32_t(std::stoul(parts[2])) : 1;
-        } catch (const std::logic_error&) {
-            throw Error("--size '" + c.size + "': WIDTHxHEIGHT[xDEPTH] was expected");
+        uint32_t* const extents[] = {&job.width, &job.height, &job.depth};
+        job.width = job.height = job.depth = 1;
+        const bool known = parts.size() <= 3;
+        for (size_t i = 0; known && i < parts.size(); ++i) {
+            const bool number = !parts[i].empty() && parts[i].size() <= 9 &&
+                                parts[i].find_first_not_of("0123456789") == std::string::npos;
+            *extents[i] = number ? uint32_t(std::stoul(parts[i])) : 0;
         }
+        if (!known || !job.width || !job.height || !job.depth)
+            throw Error("--size '" + c.size + "': WIDTHxHEIGHT[xDEPTH] was expected, each at least 1");
     } else if (c.case_file.empty()) {
         job.width = job.height = 256;
     }
@@ -150,6 +153,24 @@ Backend backend_of(const std::string& kind) {
     if (kind == "khr") return Backend::Khr;
     if (kind == "nv") return Backend::Nv;
     throw Error("--native is khr or nv, not '" + kind + "'");
+}
+
+std::string path_of(const std::string& output) {
+    const size_t equals = output.find('=');
+    return equals != std::string::npos && output.find('.') < equals ? output.substr(equals + 1) : output;
+}
+
+// Before the work rather than after it.
+void check_outputs(const CommandLine& c) {
+    for (const std::string& output : c.outputs) {
+        const std::string path = path_of(output);
+        bool known = false;
+        for (const char* extension : {".png", ".exr", ".pfm", ".bin", ".json"})
+            known = known || path.ends_with(extension);
+        if (!known)
+            throw Error("'" + path + "': outputs are written as .png, .exr or .pfm (images), .bin or .json");
+        tools::require_writable(path);
+    }
 }
 
 void write_outputs(const CommandLine& c, const RunResult& result) {
@@ -218,6 +239,7 @@ int run(const CommandLine& c) {
         return run_suite(suite);
     }
     Job job = job_of(c);
+    check_outputs(c);
     std::set<Backend> backends;
     Backend native_backend = c.native_kind.empty() ? Backend::Khr : backend_of(c.native_kind);
     if (c.compare || c.native_kind.empty()) backends.insert(Backend::Rtc);
@@ -321,6 +343,6 @@ int main(int argc, char** argv) {
     app.add_option("--save-oracle", c.save_oracle, "record native outputs there");
     app.add_flag("--list", c.list, "list the suite's cases");
     app.add_flag("-v,--verbose", c.verbose, "print cases that pass, and warnings");
-    CLI11_PARSE(app, argc, argv);
+    if (const int status = rtc::tools::parse_command_line(app, "rtc-run", argc, argv); status >= 0) return status;
     return rtc::tools::run_program("rtc-run", [&] { return rtc::run::run(c); });
 }

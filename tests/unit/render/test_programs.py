@@ -1,0 +1,133 @@
+#!/usr/bin/env python3
+"""rtc-render and rtc-info as their users meet them: files they write, and what they say about mistakes.
+
+    test_programs.py RTC-RENDER RTC-INFO
+"""
+import json
+import os
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+import zlib
+
+INFO = sys.argv.pop(2)
+RENDER = sys.argv.pop(1)
+SMALL = ["--integrator", "primary", "--width", "16", "--height", "12", "--samples", "1"]
+
+
+def run(program, *arguments, **environment):
+    done = subprocess.run([program, *arguments], capture_output=True, text=True, env={**os.environ, **environment},
+                          stdin=subprocess.DEVNULL)
+    return done.returncode, done.stdout, done.stderr
+
+
+def png_size_and_rows(path):
+    with open(path, "rb") as file:
+        data = file.read()
+    assert data[:8] == b"\x89PNG\r\n\x1a\n"
+    at, pixels = 8, b""
+    while at < len(data):
+        length, kind = struct.unpack(">I4s", data[at:at + 8])
+        if kind == b"IHDR":
+            size = struct.unpack(">II", data[at + 8:at + 16])
+        if kind == b"IDAT":
+            pixels += data[at + 8:at + 8 + length]
+        at += 12 + length
+    return size, zlib.decompress(pixels)
+
+
+class Programs(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+
+    def path(self, name, content=None):
+        path = os.path.join(self.folder.name, name)
+        if content is not None:
+            with open(path, "wb") as out:
+                out.write(content)
+        return path
+
+    def fails(self, text, *arguments, program=RENDER, **environment):
+        code, said, problem = run(program, *arguments, **environment)
+        self.assertEqual(code, 1, problem)  # an error, not a crash
+        self.assertIn(os.path.basename(program) + ": error: ", problem)
+        self.assertIn(text, problem)
+        return said
+
+    def test_pictures_of_each_kind(self):
+        for extension in ("png", "exr", "pfm"):
+            path = self.path("größe ü." + extension)
+            code, said, problem = run(RENDER, *SMALL, "-o", path)
+            self.assertEqual(code, 0, problem)
+            self.assertRegex(said, r"(?m)^device: .*Vulkan 1\.")
+            self.assertRegex(said, r"Mrays/s")
+            self.assertIn("wrote " + path, said)
+            self.assertGreater(os.path.getsize(path), 100)
+        size, rows = png_size_and_rows(self.path("größe ü.png"))
+        self.assertEqual(size, (16, 12))
+        self.assertGreater(len(set(rows)), 10)
+        with open(self.path("größe ü.pfm"), "rb") as file:
+            self.assertEqual([file.readline() for _ in range(2)], [b"PF\n", b"16 12\n"])
+        with open(self.path("größe ü.exr"), "rb") as file:
+            self.assertEqual(file.read(4), b"\x76\x2f\x31\x01")
+
+    def test_scene_files(self):
+        obj = self.path("a b.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        code, said, problem = run(RENDER, "--scene", obj, *SMALL, "-o", self.path("a.png"))
+        self.assertEqual(code, 0, problem)
+        self.assertIn("1 triangles", said)
+        for name, content in (("junk.gltf", b"\0\1\2\xff"), ("cut.gltf", b"{"), ("empty.glb", b""), ("empty.obj", b""),
+                              ("a.txt", b"x")):
+            self.fails("", "--scene", self.path(name, content), *SMALL, "-o", self.path("a.png"))
+        self.fails("nowhere.gltf", "--scene", "nowhere.gltf", *SMALL, "-o", self.path("a.png"))
+        self.fails("there are: bunny cornell", "--scene", "builtin:foo", *SMALL, "-o", self.path("a.png"))
+        self.fails("scenes are .gltf", "--scene", self.folder.name, *SMALL, "-o", self.path("a.png"))
+
+    def test_mistakes_are_told_before_the_work(self):
+        out = ["-o", self.path("a.png")]
+        for text, arguments in (("is needed", []), ("written as .png", ["-o", "a.bmp"]),
+                                ("No such file or directory", ["-o", "/nowhere/a.png"]),
+                                ("it is a folder", ["-o", self.path("folder.png")]),
+                                ("there are: path reflections", ["--integrator", "bidir", *out]),
+                                ("--width", ["--width", "-5", *out]), ("between 1 and 16384", ["--width", "0", *out]),
+                                ("--samples", ["--samples", "0", *out]), ("--fov", ["--fov", "400", *SMALL, *out]),
+                                ("--fov", ["--fov", "nan", *SMALL, *out]), ("--exposure", ["--exposure", "nan", *SMALL, *out]),
+                                ("same point", ["--eye", "0", "0", "0", "--target", "0", "0", "0", *out]),
+                                ("there are:\n  0: ", ["--device", "no such device", *out]),
+                                ("there are:\n  0: ", ["--device", "77", *out]),
+                                ("--compare needs --native", ["--compare"]), ("--classify needs", ["--classify", *out]),
+                                ("cannot read", ["--shaders", "/nowhere", *out]),
+                                ("1 module(s) were given", ["--module", "nowhere.spv", *out]),
+                                ("--help lists", ["--colour", "red", *out])):
+            os.makedirs(self.path("folder.png"), exist_ok=True)
+            with self.subTest(arguments=arguments):
+                self.assertNotIn("tracing", self.fails(text, *arguments))
+                self.assertFalse(os.path.exists(self.path("a.png")), "a picture was drawn")
+
+    def test_native_ray_tracing_that_is_not_there(self):
+        code, said, problem = run(RENDER, *SMALL, "--native", "nv", "-o", self.path("a.png"))
+        if code == 0:
+            self.skipTest("the device has VK_NV_ray_tracing")
+        self.assertIn("lacks VK_NV_ray_tracing", problem)
+
+    def test_no_driver_at_all(self):
+        for program, arguments in ((RENDER, [*SMALL, "-o", self.path("a.png")]), (INFO, [])):
+            self.fails("no Vulkan driver found", *arguments, program=program, VK_DRIVER_FILES="/nowhere",
+                       VK_ICD_FILENAMES="/nowhere")
+
+    def test_info(self):
+        code, said, problem = run(INFO, "--device", "0")
+        self.assertEqual(code, 0, problem)
+        for text in ("device 0: ", "rtc runs:", "mode:", "recommended:", "limits:", "float arithmetic:"):
+            self.assertIn(text, said)
+        code, said, problem = run(INFO, "--json", "--no-probe")
+        self.assertEqual(code, 0, problem)
+        self.assertGreaterEqual(len(json.loads(said)), 1)
+        self.fails("there are:\n  0: ", "--device", "99", program=INFO)
+        self.fails("extra", "extra", program=INFO)
+
+
+unittest.main()
