@@ -165,9 +165,16 @@ void freeze_link_constants(ir::Module& module, const std::map<uint32_t, uint32_t
 // split.cpp: cuts a stage in memory form into states at its calls and adds them to the machine.
 void split_stage(Program& program, lower::Stage& stage, const lower::CallKinds& kinds, Machine& machine);
 
-// liveness.cpp: for each call block of a body in memory form (by label), the variables whose
-// value is needed after the call. `candidates` are the variables looked at, in order.
-std::map<Id, std::vector<Id>> live_across_calls(const lower::Stage& stage,
-                                                const lower::CallKinds& kinds, const std::vector<Id>& candidates);
+// A variable whose value, or part of it, is needed after a call.
+struct LiveVariable {
+    Id variable = 0;
+    std::vector<uint32_t> scalars;  // which of Program::flatten's leaves; empty: all
+};
+
+// liveness.cpp: for each call block of a body in memory form (by label), what is needed after the call.
+// `candidates` are the variables looked at with what they hold, in order.
+std::map<Id, std::vector<LiveVariable>> live_across_calls(const Program& program, const lower::Stage& stage,
+                                                          const lower::CallKinds& kinds,
+                                                          const std::vector<std::pair<Id, Id>>& candidates);
 
 }  // namespace rtc::continuation

@@ -29,8 +29,11 @@ class Splitter {
         for (const Block& block : stage_.body.blocks) blocks_[block.label] = &block;
         find_starts();
         if (stage_.kind != StageKind::RayGen && stage_.kind != StageKind::AnyHit &&
-            stage_.kind != StageKind::Intersection)
-            live_ = live_across_calls(stage_, kinds_, candidates_);
+            stage_.kind != StageKind::Intersection) {
+            std::vector<std::pair<Id, Id>> typed;
+            for (Id id : candidates_) typed.push_back({id, pointee_of(id)});
+            live_ = live_across_calls(p_, stage_, kinds_, typed);
+        }
         const Id entry = stage_.body.blocks.front().label;
         ids_[entry] = m_.entry_state(stage_.index);
         for (const Block& block : stage_.body.blocks)
@@ -574,10 +577,11 @@ class Splitter {
         site.file = p_.module.files[inst.source.file];
         site.line = inst.source.line;
         if (pushes_frame(inst)) {
-            for (Id variable : live_[block.label]) {
-                const Id type = pointee_of(variable);
-                const std::string name = p_.module.name_of(variable);
-                for (Id word : e.to_words(e.load(type, variable), type)) e.store(m_.frame_word(count++), word);
+            for (const LiveVariable& live : live_[block.label]) {
+                const std::string name = p_.module.name_of(live.variable);
+                for_each_live(e, live, [&](Id pointer, Id type) {
+                    for (Id word : e.to_words(e.load(type, pointer), type)) e.store(m_.frame_word(count++), word);
+                });
                 site.variables.push_back(name.empty() ? "(temporary)" : name);
             }
             e.store(m_.frame_word(count++), e.load(p_.uint_type(), return_variable));
@@ -587,6 +591,21 @@ class Splitter {
         site.frame_bytes = count * 4;
         m_.sites.push_back(std::move(site));
         return count;
+    }
+
+    // The whole variable, or its live scalars one by one.
+    void for_each_live(Emitter& e, const LiveVariable& live, const std::function<void(Id pointer, Id type)>& fn) {
+        const Id type = pointee_of(live.variable);
+        if (live.scalars.empty()) return fn(live.variable, type);
+        std::vector<ir::Leaf> leaves;
+        p_.flatten(type, leaves, "a live value");
+        const Inst* global = p_.def(live.variable);
+        const auto storage = global ? static_cast<spv::StorageClass>(global->ops[0]) : spv::StorageClass::Function;
+        for (uint32_t i : live.scalars) {
+            std::vector<Id> path;
+            for (uint32_t index : leaves[i].path) path.push_back(p_.constant_u32(index));
+            fn(e.chain(storage, leaves[i].type, live.variable, path), leaves[i].type);
+        }
     }
 
     Id pointee_of(Id variable) const {
@@ -599,14 +618,14 @@ class Splitter {
     void restore_frame(Emitter& e, const Block& block, const Inst& inst, Id return_variable) {
         if (!pushes_frame(inst)) return;
         uint32_t at = 0;
-        for (Id variable : live_[block.label]) {
-            const Id type = pointee_of(variable);
-            const uint32_t count = p_.word_count(type, "a live value");
-            std::vector<Id> words;
-            for (uint32_t i = 0; i < count; ++i) words.push_back(e.load(p_.uint_type(), m_.frame_word(at++)));
-            size_t used = 0;
-            e.store(variable, e.from_words(type, words, used));
-        }
+        for (const LiveVariable& live : live_[block.label])
+            for_each_live(e, live, [&](Id pointer, Id type) {
+                const uint32_t count = p_.word_count(type, "a live value");
+                std::vector<Id> words;
+                for (uint32_t i = 0; i < count; ++i) words.push_back(e.load(p_.uint_type(), m_.frame_word(at++)));
+                size_t used = 0;
+                e.store(pointer, e.from_words(type, words, used));
+            });
         e.store(return_variable, e.load(p_.uint_type(), m_.frame_word(at)));
     }
 
@@ -775,7 +794,7 @@ class Splitter {
     Machine& m_;
     Regions regions_;
     std::vector<Id> candidates_;
-    std::map<Id, std::vector<Id>> live_;
+    std::map<Id, std::vector<LiveVariable>> live_;
     std::map<Id, const Block*> blocks_;
     std::set<Id> starts_, emitted_;
     std::map<Id, uint32_t> ids_;
