@@ -1,7 +1,5 @@
 #include "link/bits.h"
 
-#include <set>
-
 namespace rtc::link {
 
 using ir::Id;
@@ -20,52 +18,103 @@ constexpr int kMaxDepth = 64;
 
 }  // namespace
 
-BitAnalysis::BitAnalysis(const ir::Program& program, const ir::Function& function,
-                         const std::map<Id, Bits>& contents, bool settle_locals)
-    : p_(program), contents_(contents) {
-    std::set<Id> other;
-    for (const ir::Block& block : function.blocks)
-        for (const Inst& inst : block.insts) {
-            if (inst.result) defs_[inst.result] = &inst;
-            if (inst.op == Op::OpVariable) {
-                auto& values = stores_[inst.result];
-                if (inst.ops.size() > 1) values.push_back(inst.ops[1]);
-            } else if (inst.op == Op::OpStore) {
-                stores_[inst.ops[0]].push_back(inst.ops[1]);
-                other.insert(inst.ops[1]);
-            } else if (inst.op != Op::OpLoad) {
-                inst.for_each_id([&](Id id) { other.insert(id); });
+BitAnalysis::BitAnalysis(const ir::Program& program, const std::vector<const ir::Function*>& functions,
+                         const std::map<Id, Bits>& given, bool module_variables)
+    : p_(program) {
+    for (const auto& [id, bits] : given) {
+        Cell& fixed = cell(id);
+        fixed.bits = bits;
+        fixed.fixed = true;
+    }
+    collect(functions, module_variables);
+    settle();
+}
+
+BitAnalysis::Cell& BitAnalysis::cell(Id id) {
+    uint32_t& index = cell_index_[id];
+    if (!index) {
+        cells_.push_back({id, {}, {}, false});
+        index = static_cast<uint32_t>(cells_.size());
+    }
+    return cells_[index - 1];
+}
+
+void BitAnalysis::collect(const std::vector<const ir::Function*>& functions, bool module_variables) {
+    ir::IdSet open;  // touched by more than whole loads and stores
+    for (const ir::Function* function : functions)
+        for (const ir::Block& block : function->blocks)
+            for (const Inst& inst : block.insts) {
+                if (inst.result) defs_[inst.result] = &inst;
+                switch (inst.op) {
+                    case Op::OpLoad: break;
+                    case Op::OpStore: {
+                        open.insert(inst.ops[1]);
+                        const Inst* variable = def(inst.ops[0]);
+                        if (!variable || variable->op != Op::OpVariable || !mask(p_.pointee(variable->type))) break;
+                        const auto storage = static_cast<spv::StorageClass>(variable->ops[0]);
+                        if (storage == spv::StorageClass::Function ||
+                            (storage == spv::StorageClass::Private && module_variables))
+                            cell(inst.ops[0]).values.push_back(inst.ops[1]);
+                        break;
+                    }
+                    case Op::OpVariable:
+                        if (inst.ops.size() > 1 && mask(p_.pointee(inst.type)))
+                            cell(inst.result).values.push_back(inst.ops[1]);
+                        break;
+                    case Op::OpReturnValue: cell(function->id()).values.push_back(inst.ops[0]); break;
+                    case Op::OpAccessChain:
+                    case Op::OpInBoundsAccessChain:
+                    case Op::OpCopyObject: open.insert(inst.ops[0]); break;
+                    case Op::OpFunctionCall:
+                    case Op::OpCopyMemory:
+                    case Op::OpExtInst:
+                    case Op::OpPhi:
+                    case Op::OpSelect:
+                        for (uint32_t id : inst.ops) open.insert(id);
+                        break;
+                    default:
+                        // Only pointers matter; conversions, arithmetic and comparisons take none.
+                        if (inst.op < Op::OpConvertFToU || inst.op > Op::OpBitCount)
+                            inst.for_each_id([&](Id id) { open.insert(id); });
+                        break;
+                }
             }
+    for (Cell& one : cells_) {
+        if (one.fixed) continue;
+        const Inst* variable = def(one.id);
+        const bool is_variable = variable && variable->op == Op::OpVariable;
+        const bool global_with_initializer = is_variable && !defs_.get(one.id) && variable->ops.size() > 1;
+        if ((is_variable && open.contains(one.id)) || global_with_initializer || one.values.empty()) {
+            one.fixed = true;  // of unknown content
+            one.bits = {};
+        } else {
+            one.bits = {~0u, ~0u};
         }
-    for (Id id : other) stores_.erase(id);
-    if (settle_locals) settle();
+    }
 }
 
 // Starts from "everything is known", which no value satisfies, and takes away what a store does not keep.
 // What stays true in a whole round is true by induction over the stores.
 void BitAnalysis::settle() {
-    for (const auto& [variable, values] : stores_) {
-        const auto def = defs_.find(variable);
-        if (values.empty() || def == defs_.end() || def->second->op != Op::OpVariable) continue;
-        if (const uint32_t all = mask(p_.pointee(def->second->type))) settled_[variable] = {all, all};
-    }
-    for (int round = 0; round < 16; ++round) {
-        known_.clear();
-        open_.clear();
-        std::map<Id, Bits> next;
-        for (const auto& [variable, bits] : settled_) {
-            const std::vector<Id>& values = stores_.at(variable);
-            Bits joined = of(values.front());
-            for (Id value : values) joined = both(joined, of(value));
-            next[variable] = both(joined, bits);
+    bool stable = false;
+    for (int round = 0; round < 16 && !stable; ++round) {
+        stable = true;
+        ++epoch_;
+        std::vector<Bits> next(cells_.size());
+        for (size_t i = 0; i < cells_.size(); ++i) {
+            next[i] = cells_[i].bits;
+            if (cells_[i].fixed) continue;
+            for (Id value : cells_[i].values) {
+                if (!(next[i].zeros | next[i].ones)) break;
+                next[i] = both(next[i], of(value));
+            }
+            stable &= next[i] == cells_[i].bits;
         }
-        if (next == settled_) break;
-        settled_ = std::move(next);
-        if (round == 15) settled_.clear();
+        for (size_t i = 0; i < cells_.size(); ++i) cells_[i].bits = next[i];
     }
-    std::erase_if(settled_, [](const auto& entry) { return (entry.second.zeros & entry.second.ones) != 0; });
-    known_.clear();
-    open_.clear();
+    for (Cell& one : cells_)
+        if (!one.fixed && (!stable || (one.bits.zeros & one.bits.ones))) one.bits = {};
+    ++epoch_;
 }
 
 uint32_t BitAnalysis::mask(Id type) const {
@@ -76,32 +125,28 @@ uint32_t BitAnalysis::mask(Id type) const {
 }
 
 Bits BitAnalysis::of(Id id) {
-    if (const auto found = known_.find(id); found != known_.end()) return found->second;
-    if (open_[id] || depth_ >= kMaxDepth) return {};
-    const auto local = defs_.find(id);
-    const Inst* inst = local != defs_.end() ? local->second : p_.def(id);
+    {
+        const Known known = known_.get(id);
+        if (known.epoch == epoch_) return known.bits;
+    }
+    if (depth_ >= kMaxDepth) return {};
+    const Inst* inst = def(id);
     if (!inst || !inst->type) return {};
-    open_[id] = true;
+    const uint32_t all = mask(inst->type);
+    known_[id] = {{}, epoch_};  // while it is computed, nothing is known: never something wrong
+    if (!all) return {};
     ++depth_;
     Bits bits = compute(*inst);
     --depth_;
-    open_[id] = false;
-    const uint32_t all = mask(inst->type);
     bits.zeros &= all;
     bits.ones &= all;
-    // Where a cycle or the depth cut the search, less is known than could be: never something wrong.
-    return known_[id] = bits;
+    known_[id] = {bits, epoch_};
+    return bits;
 }
 
-Bits BitAnalysis::stored(Id variable) {
-    if (const auto found = settled_.find(variable); found != settled_.end()) return found->second;
-    const auto found = stores_.find(variable);
-    if (found == stores_.end() || found->second.empty()) return {};
-    const auto def = defs_.find(variable);
-    if (def == defs_.end() || def->second->op != Op::OpVariable) return {};
-    Bits bits = of(found->second.front());
-    for (Id value : found->second) bits = both(bits, of(value));
-    return bits;
+Bits BitAnalysis::content(Id id) const {
+    const uint32_t index = cell_index_.get(id);
+    return index ? cells_[index - 1].bits : Bits{};
 }
 
 Bits BitAnalysis::compute(const Inst& inst) {
@@ -112,14 +157,8 @@ Bits BitAnalysis::compute(const Inst& inst) {
         case Op::OpConstant: return mask(inst.type) ? exactly(inst.ops[0]) : Bits{};
         case Op::OpSpecConstantOp:
             return operation(static_cast<Op>(inst.ops[0]), inst.type, inst.ops.data() + 1, inst.ops.size() - 1);
-        case Op::OpLoad: {
-            const auto found = contents_.find(inst.ops[0]);
-            return found != contents_.end() ? found->second : stored(inst.ops[0]);
-        }
-        case Op::OpFunctionCall: {
-            const auto found = contents_.find(inst.ops[0]);
-            return found != contents_.end() ? found->second : Bits{};
-        }
+        case Op::OpLoad:
+        case Op::OpFunctionCall: return content(inst.ops[0]);
         case Op::OpPhi: {
             Bits bits = of(inst.ops[0]);
             for (size_t i = 2; i < inst.ops.size(); i += 2) bits = both(bits, of(inst.ops[i]));
@@ -135,8 +174,7 @@ Bits BitAnalysis::operation(Op op, Id type, const uint32_t* ops, size_t count) {
     const Bits b = count > 1 ? of(ops[1]) : Bits{};
     // Comparisons look at their operands' width, not at the result's.
     auto operand_mask = [&] {
-        const auto local = defs_.find(ops[0]);
-        const Inst* inst = local != defs_.end() ? local->second : p_.def(ops[0]);
+        const Inst* inst = def(ops[0]);
         return inst ? mask(inst->type) : 0;
     };
     const bool differ = (a.ones & b.zeros) != 0 || (a.zeros & b.ones) != 0;

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <map>
-#include <unordered_map>
 
 #include "ir/program.h"
 
@@ -20,36 +19,49 @@ struct Bits {
 Bits exactly(uint32_t value);
 Bits both(Bits a, Bits b);  // what holds for either value
 
-// Known bits of values of one function and of the globals, computed on demand.
+// Known bits of the values of some functions. Variables that only whole loads and stores touch are looked
+// through, and so are calls; both also where a value depends on itself (flags |= x).
 class BitAnalysis {
   public:
-    // `contents`: what loads of these variables and calls of these functions give. Local variables that only
-    // loads and stores touch are looked through. `settle`: also where they are stored in terms of themselves
-    // (flags |= x); takes several rounds over the function.
-    BitAnalysis(const ir::Program& program, const ir::Function& function, const std::map<ir::Id, Bits>& contents,
-                bool settle);
+    // `given`: what loads of these variables give, whatever is stored. `module_variables`: nothing but these
+    // functions stores to module-scope variables. Neither the functions nor their instructions may change
+    // while the analysis is asked.
+    BitAnalysis(const ir::Program& program, const std::vector<const ir::Function*>& functions,
+                const std::map<ir::Id, Bits>& given, bool module_variables);
     Bits of(ir::Id id);
     uint32_t mask(ir::Id type) const;  // all bits of the type: 1 for bool, ~0 for 32-bit integers, else 0
+    // The instruction that makes a value of the functions or a global one; null for parameters.
+    const ir::Inst* def(ir::Id id) const {
+        const ir::Inst* local = defs_.get(id);
+        return local ? local : p_.def(id);
+    }
 
   private:
+    // A variable or a function's result: one of several values.
+    struct Cell {
+        ir::Id id = 0;
+        std::vector<ir::Id> values;
+        Bits bits;
+        bool fixed = false;
+    };
+    struct Known {
+        Bits bits;
+        uint32_t epoch = 0;
+    };
+    Cell& cell(ir::Id id);
+    void collect(const std::vector<const ir::Function*>& functions, bool module_variables);
+    void settle();
     Bits compute(const ir::Inst& inst);
     Bits operation(ir::Op op, ir::Id type, const uint32_t* ops, size_t count);
-    Bits stored(ir::Id variable);
-    void settle();
+    Bits content(ir::Id id) const;
 
     const ir::Program& p_;
-    const std::map<ir::Id, Bits>& contents_;
-    std::unordered_map<ir::Id, const ir::Inst*> defs_;
-    std::unordered_map<ir::Id, std::vector<ir::Id>> stores_;  // local variable -> values; absent: touched otherwise
-    std::map<ir::Id, Bits> settled_;  // contents of local variables
-    std::unordered_map<ir::Id, Bits> known_;
-    std::unordered_map<ir::Id, bool> open_;  // being computed: nothing is known yet
+    ir::IdMap<const ir::Inst*> defs_;
+    std::vector<Cell> cells_;
+    ir::IdMap<uint32_t> cell_index_;  // plus one
+    ir::IdMap<Known> known_;
+    uint32_t epoch_ = 1;
     int depth_ = 0;
 };
-
-// What module-scope variables hold wherever they are stored, and what functions return: from the stores and
-// returns of `functions`, of which nothing else writes them. `given` stands as it is. (fold.cpp)
-std::map<ir::Id, Bits> contents_of(const ir::Program& program, const std::vector<const ir::Function*>& functions,
-                                   const std::map<ir::Id, Bits>& given, bool variables);
 
 }  // namespace rtc::link

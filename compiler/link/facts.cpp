@@ -66,10 +66,10 @@ std::string flag_names(uint32_t bits) {
 }  // namespace
 
 void collect_trace_facts(const Program& program, const lower::Stage& stage, TraceFacts& facts) {
-    std::vector<const ir::Function*> functions;
+    std::vector<const ir::Function*> functions{&stage.body};
     for (const ir::Function& function : stage.functions) functions.push_back(&function);
-    const std::map<Id, Bits> returns = contents_of(program, functions, {}, false);
-    BitAnalysis bits(program, stage.body, returns, true);
+    // Module-scope variables may be payloads, which others write.
+    BitAnalysis bits(program, functions, {}, false);
     for (const ir::Block& block : stage.body.blocks)
         for (const Inst& inst : block.insts) {
             if (!lower::is_trace(inst.op)) continue;

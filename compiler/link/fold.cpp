@@ -14,46 +14,58 @@ namespace {
 using ir::Block;
 using ir::Function;
 
-// ---- values and branches of one function -----------------------------------------------------------------
+// ---- constant values ------------------------------------------------------------------------------------
 
-// Large functions are the machine's main, whose variables are not stored in terms of themselves.
-bool settles(const Function& function) { return function.blocks.size() < 200; }
-
-class Folder {
+// What values become: constants, or other values they always equal.
+class Values {
   public:
-    Folder(Program& program, Function& function, const std::map<Id, Bits>& contents)
-        : p_(program), f_(function), contents_(contents) {}
+    Values(Program& program, const std::vector<Function*>& functions, const std::map<Id, Bits>& given)
+        : p_(program), functions_(functions), bits_(program, {functions.begin(), functions.end()}, given, true) {}
 
-    void run() {
-        // Each round can only make code shorter; most functions settle in two.
-        for (int round = 0; round < 8; ++round) {
-            bool changed = fold_values();
-            changed |= fold_branches();
-            if (changed) remove_unreachable();
-            changed |= join_blocks();
-            if (!changed) return;
+    void replace() {
+        // All is decided before the first instruction moves.
+        for (size_t i = 0; i < p_.module.globals.size(); ++i) {
+            const Inst& inst = p_.module.globals[i];
+            if (inst.op == Op::OpSpecConstantOp) decide(Id(inst.result), Id(inst.type));
         }
+        for (const Function* function : functions_)
+            for (const Inst& inst : function->params) params_.insert(inst.result);
+        for (const Function* function : functions_)
+            for (const Block& block : function->blocks)
+                for (const Inst& inst : block.insts) {
+                    if (!inst.result || inst.op == Op::OpVariable || decide(inst.result, inst.type)) continue;
+                    const Id same = same_as(inst);
+                    if (same && !params_.contains(same) && bits_.def(same) && bits_.def(same)->type == inst.type)
+                        become_[inst.result] = same;
+                }
+        for (Function* function : functions_)
+            for (Block& block : function->blocks) {
+                for (Inst& inst : block.insts) inst.for_each_id([&](Id& id) { id = resolve(id); });
+                // A call may do more than give its value.
+                std::erase_if(block.insts, [&](const Inst& inst) {
+                    return inst.result && inst.op != Op::OpFunctionCall && become_.get(inst.result);
+                });
+            }
     }
 
   private:
-    Id constant(Id type, uint32_t bits) {
-        return p_.type_op(type) == Op::OpTypeBool ? p_.constant_bool(bits != 0) : p_.constant_scalar(type, bits);
-    }
-
-    bool is_constant(Id id) const {
-        const Inst* inst = p_.def(id);
-        return inst && (inst->op == Op::OpConstant || inst->op == Op::OpConstantTrue ||
-                        inst->op == Op::OpConstantFalse || inst->op == Op::OpConstantNull);
+    bool decide(Id id, Id type) {
+        const uint32_t all = bits_.mask(type);
+        if (!all) return false;
+        const Bits known = bits_.of(id);
+        if (!known.constant(all)) return false;
+        become_[id] = p_.type_op(type) == Op::OpTypeBool ? p_.constant_bool(known.ones != 0)
+                                                          : p_.constant_scalar(type, known.ones);
+        return true;
     }
 
     // The operand an operation equals whatever its other operand is; 0: none.
-    Id same_as(BitAnalysis& bits, const Inst& inst) {
-        const uint32_t all = bits.mask(inst.type);
-        auto is = [&](Id id, uint32_t value) { return bits.of(id) == Bits{~value & all, value}; };
+    Id same_as(const Inst& inst) {
+        const uint32_t all = bits_.mask(inst.type);
+        auto is = [&](Id id, uint32_t value) { return bits_.of(id) == Bits{~value & all, value}; };
         switch (inst.op) {
             case Op::OpSelect: {
-                const Bits c = bits.of(inst.ops[0]);
-                // A vector of booleans has no known bits.
+                const Bits c = bits_.of(inst.ops[0]);  // a vector of booleans has no known bits
                 return c.ones ? inst.ops[1] : c.zeros ? inst.ops[2] : inst.ops[1] == inst.ops[2] ? inst.ops[1] : 0;
             }
             case Op::OpLogicalAnd:
@@ -72,58 +84,37 @@ class Folder {
         }
     }
 
-    Id type_of(Id id, const std::unordered_map<Id, Id>& types) const {
-        if (const auto found = types.find(id); found != types.end()) return found->second;
-        const Inst* inst = p_.def(id);
-        return inst ? inst->type : 0;
-    }
-
-    bool fold_values() {
-        BitAnalysis bits(p_, f_, contents_, settles(f_));
-        std::unordered_map<Id, Id> types;
-        for (const Block& block : f_.blocks)
-            for (const Inst& inst : block.insts)
-                if (inst.result) types[inst.result] = inst.type;
-        for (const Inst& inst : f_.params) types[inst.result] = inst.type;
-        std::unordered_map<Id, Id> become;
-        for (const Block& block : f_.blocks)
-            for (const Inst& inst : block.insts) {
-                if (!inst.result || inst.op == Op::OpVariable) continue;
-                const uint32_t all = bits.mask(inst.type);
-                const Bits known = all ? bits.of(inst.result) : Bits{};
-                if (all && known.constant(all)) {
-                    become[inst.result] = constant(inst.type, known.ones);
-                } else if (const Id same = same_as(bits, inst); same && type_of(same, types) == inst.type) {
-                    become[inst.result] = same;
-                }
-            }
-        auto resolve = [&](Id id) {
-            for (int hops = 0; hops < 1000; ++hops) {
-                const auto found = become.find(id);
-                if (found == become.end()) break;
-                id = found->second;
-            }
-            return id;
-        };
-        bool changed = false;
-        for (Block& block : f_.blocks) {
-            for (Inst& inst : block.insts)
-                inst.for_each_id([&](Id& id) {
-                    Id to = resolve(id);
-                    if (const Inst* global = p_.def(to); global && global->op == Op::OpSpecConstantOp)
-                        if (const uint32_t all = bits.mask(global->type); all && bits.of(to).constant(all))
-                            to = constant(global->type, bits.of(to).ones);
-                    changed |= to != id;
-                    id = to;
-                });
-            changed |= std::erase_if(block.insts, [&](const Inst& inst) {
-                           // A call may do more than give its value.
-                           return inst.result && inst.op != Op::OpFunctionCall && become.count(inst.result) != 0;
-                       }) != 0;
+    Id resolve(Id id) const {
+        for (int hops = 0; hops < 1000; ++hops) {
+            const Id next = become_.get(id);
+            if (!next) break;
+            id = next;
         }
-        return changed;
+        return id;
     }
 
+    Program& p_;
+    const std::vector<Function*>& functions_;
+    BitAnalysis bits_;
+    ir::IdSet params_;
+    ir::IdMap<Id> become_;
+};
+
+// ---- branches of one function ---------------------------------------------------------------------------
+
+class Branches {
+  public:
+    Branches(Program& program, Function& function) : p_(program), f_(function) {}
+
+    // True when one was folded.
+    bool fold() {
+        if (!fold_branches()) return false;
+        remove_unreachable();
+        join_blocks();
+        return true;
+    }
+
+  private:
     bool fold_branches() {
         bool changed = false;
         for (Block& block : f_.blocks) {
@@ -143,16 +134,16 @@ class Folder {
     }
 
     void remove_unreachable() {
-        std::unordered_map<Id, Block*> blocks;
+        ir::IdMap<Block*> blocks;
         for (Block& block : f_.blocks) blocks[block.label] = &block;
-        std::set<Id> reachable;
+        ir::IdSet reachable;
         std::vector<Id> work{f_.blocks.front().label};
-        std::map<Id, Id> merges, continues;  // label -> header
+        ir::IdMap<Id> merges, continues;  // label -> header
         while (!work.empty()) {
             const Id label = work.back();
             work.pop_back();
-            if (!reachable.insert(label).second) continue;
-            const Block& block = *blocks.at(label);
+            if (!reachable.insert(label)) continue;
+            const Block& block = *blocks.get(label);
             for (Id next : block.successors()) work.push_back(next);
             if (const Inst* merge = block.merge()) {
                 merges[merge->ops[0]] = label;
@@ -162,17 +153,21 @@ class Folder {
         // A merge or continue target must exist although nothing gets there.
         for (Block& block : f_.blocks) {
             if (reachable.count(block.label)) continue;
-            if (const auto found = continues.find(block.label); found != continues.end())
-                block.insts = {Inst(Op::OpBranch, 0, 0, {found->second})};
-            else if (merges.count(block.label))
+            if (const Id header = continues.get(block.label))
+                block.insts = {Inst(Op::OpBranch, 0, 0, {header})};
+            else if (merges.get(block.label))
                 block.insts = {Inst(Op::OpUnreachable, 0, 0, {})};
         }
         std::erase_if(f_.blocks, [&](const Block& block) {
-            return !reachable.count(block.label) && !merges.count(block.label) && !continues.count(block.label);
+            return !reachable.count(block.label) && !merges.get(block.label) && !continues.get(block.label);
         });
-        std::map<Id, std::set<Id>> sources;
+        std::map<Id, std::set<Id>> sources;  // of blocks that begin with a phi
         for (const Block& block : f_.blocks)
-            for (Id next : block.successors()) sources[next].insert(block.label);
+            if (!block.insts.empty() && block.insts.front().op == Op::OpPhi) sources[block.label];
+        if (sources.empty()) return;
+        for (const Block& block : f_.blocks)
+            for (Id next : block.successors())
+                if (const auto found = sources.find(next); found != sources.end()) found->second.insert(block.label);
         for (Block& block : f_.blocks)
             for (Inst& inst : block.insts) {
                 if (inst.op != Op::OpPhi) continue;
@@ -186,20 +181,20 @@ class Folder {
     }
 
     // A block that only one branch reaches continues the block it comes from.
-    bool join_blocks() {
-        std::map<Id, int> arrivals;
-        std::set<Id> named;
-        std::unordered_map<Id, size_t> index;
+    void join_blocks() {
+        ir::IdMap<uint32_t> arrivals, index;
+        ir::IdSet named;
         for (size_t i = 0; i < f_.blocks.size(); ++i) {
             const Block& block = f_.blocks[i];
-            index[block.label] = i;
+            index[block.label] = static_cast<uint32_t>(i);
             for (Id next : block.successors()) ++arrivals[next];
             if (const Inst* merge = block.merge()) {
                 named.insert(merge->ops[0]);
                 if (merge->op == Op::OpLoopMerge) named.insert(merge->ops[1]);
             }
         }
-        std::unordered_map<Id, Id> joined;  // label -> the block it is part of now
+        ir::IdMap<Id> joined;  // label -> the block it is part of now
+        bool any = false;
         std::vector<bool> gone(f_.blocks.size(), false);
         for (size_t i = 0; i < f_.blocks.size(); ++i) {
             if (gone[i]) continue;
@@ -207,20 +202,20 @@ class Folder {
                 Block& block = f_.blocks[i];
                 if (block.terminator().op != Op::OpBranch || block.merge()) break;
                 const Id next = block.terminator().ops[0];
-                const size_t at = index.at(next);
-                if (arrivals[next] != 1 || named.count(next) || at == i || at == 0) break;
+                const size_t at = index.get(next);
+                if (arrivals.get(next) != 1 || named.count(next) || at == i || at == 0) break;
                 Block& tail = f_.blocks[at];
                 if (!tail.insts.empty() && tail.insts.front().op == Op::OpPhi) break;  // becomes a value first
                 block.insts.pop_back();
                 std::move(tail.insts.begin(), tail.insts.end(), std::back_inserter(block.insts));
                 gone[at] = true;
                 joined[next] = block.label;
+                any = true;
             }
         }
-        if (joined.empty()) return false;
+        if (!any) return;
         auto resolve = [&](Id label) {
-            for (auto found = joined.find(label); found != joined.end(); found = joined.find(label))
-                label = found->second;
+            while (const Id into = joined.get(label)) label = into;
             return label;
         };
         std::vector<Block> left;
@@ -231,12 +226,10 @@ class Folder {
             for (Inst& inst : block.insts)
                 if (inst.op == Op::OpPhi)
                     for (size_t i = 1; i < inst.ops.size(); i += 2) inst.ops[i] = resolve(inst.ops[i]);
-        return true;
     }
 
     Program& p_;
     Function& f_;
-    const std::map<Id, Bits>& contents_;
 };
 
 // ---- what nobody needs ---------------------------------------------------------------------------------------
@@ -281,6 +274,7 @@ class Liveness {
             for (const Block& block : function->blocks)
                 for (const Inst& inst : block.insts)
                     if (inst.result) defs_[inst.result] = &inst;
+        store_count_ = 0;
     }
 
     void run() {
@@ -293,17 +287,21 @@ class Liveness {
             work_.pop_back();
             follow(*inst);
         }
+        uint32_t store = 0;
         for (Function* function : order_)
             for (Block& block : function->blocks)
-                std::erase_if(block.insts, [&](const Inst& inst) { return !live_.count(&inst); });
+                std::erase_if(block.insts, [&](const Inst& inst) {
+                    if (inst.op == Op::OpStore) return !live_stores_[store++];
+                    return inst.result && !live_.contains(inst.result);
+                });
     }
 
   private:
     // The variable a pointer leads to when it is one that only this invocation sees; 0 otherwise.
     Id own_variable(Id pointer) const {
         for (;;) {
-            const auto local = defs_.find(pointer);
-            const Inst* inst = local != defs_.end() ? local->second : p_.def(pointer);
+            const Inst* local = defs_.get(pointer);
+            const Inst* inst = local ? local : p_.def(pointer);
             if (!inst) return 0;
             switch (inst->op) {
                 case Op::OpVariable: {
@@ -339,51 +337,72 @@ class Liveness {
 
     // Variables whose loads a value is made of.
     void sources(Id value, std::set<Id>& out, int depth = 0) const {
-        const auto local = defs_.find(value);
-        if (local == defs_.end() || depth > 16) return;
-        if (local->second->op == Op::OpLoad) {
-            out.insert(own_variable(local->second->ops[0]));
+        const Inst* local = defs_.get(value);
+        if (!local || depth > 16) return;
+        if (local->op == Op::OpLoad) {
+            out.insert(own_variable(local->ops[0]));
             return;
         }
-        if (!is_plain(*local->second)) {
+        if (!is_plain(*local)) {
             out.insert(0);
             return;
         }
-        local->second->for_each_id([&](Id id) { sources(id, out, depth + 1); });
+        local->for_each_id([&](Id id) { sources(id, out, depth + 1); });
     }
 
     void start(const Function& function, const Inst& inst) {
         if (inst.op == Op::OpStore) {
             const Id variable = own_variable(inst.ops[0]);
+            const uint32_t number = store_count_++;
+            live_stores_.push_back(false);
             if (!variable)
-                mark(&inst);
+                mark({&inst, number});
             else
-                stores_[variable].push_back(&inst);
+                writers_of(variable).push_back({&inst, number});
         } else if (inst.op == Op::OpFunctionCall) {
             if (function.id() == save_ && inst.ops[0] == store_) {
                 // A word of a waiting ray is kept only for those who read it.
                 std::set<Id> variables;
                 sources(inst.ops[2], variables);
                 if (!variables.empty() && !variables.count(0)) {
-                    for (Id variable : variables) stores_[variable].push_back(&inst);
+                    for (Id variable : variables) writers_of(variable).push_back({&inst, 0});
                     return;
                 }
             }
-            if (!pure_.count(inst.ops[0])) mark(&inst);
+            if (!pure_.count(inst.ops[0])) mark({&inst, 0});
         } else if (!is_plain(inst)) {
-            mark(&inst);
+            mark({&inst, 0});
         }
     }
 
-    void mark(const Inst* inst) {
-        if (live_.insert(inst).second) work_.push_back(inst);
+    // What has a result is known by it, stores by their number; everything else stays.
+    struct Writer {
+        const Inst* inst = nullptr;
+        uint32_t number = 0;
+    };
+    std::vector<Writer>& writers_of(Id variable) {
+        uint32_t& index = writer_index_[variable];
+        if (!index) {
+            writers_.emplace_back();
+            index = static_cast<uint32_t>(writers_.size());
+        }
+        return writers_[index - 1];
+    }
+
+    void mark(Writer writer) {
+        if (writer.inst->result) {
+            if (!live_.insert(writer.inst->result)) return;
+        } else if (writer.inst->op == Op::OpStore) {
+            if (live_stores_[writer.number]) return;
+            live_stores_[writer.number] = true;
+        }
+        work_.push_back(writer.inst);
     }
 
     void read(Id variable) {
-        if (!variable || !read_.insert(variable).second) return;
-        const auto found = stores_.find(variable);
-        if (found == stores_.end()) return;
-        for (const Inst* store : found->second) mark(store);
+        if (!variable || !read_.insert(variable)) return;
+        if (const uint32_t index = writer_index_.get(variable))
+            for (const Writer& writer : writers_[index - 1]) mark(writer);
     }
 
     void follow(const Inst& inst) {
@@ -391,8 +410,7 @@ class Liveness {
                             inst.op == Op::OpCopyObject || inst.op == Op::OpVariable;
         bool first = true;
         inst.for_each_id([&](Id id) {
-            const auto local = defs_.find(id);
-            if (local != defs_.end()) mark(local->second);
+            if (const Inst* local = defs_.get(id)) mark({local, 0});
             const bool target = inst.op == Op::OpStore && first;
             first = false;
             if (!passes && !target) read(own_variable(id));
@@ -402,66 +420,14 @@ class Liveness {
     Program& p_;
     Id save_, store_;
     std::vector<Function*> order_;
-    std::unordered_map<Id, const Inst*> defs_;
-    std::set<Id> pure_, read_;
-    std::unordered_map<Id, std::vector<const Inst*>> stores_;
-    std::set<const Inst*> live_;
+    ir::IdMap<const Inst*> defs_;
+    ir::IdSet pure_, read_, live_;
+    std::vector<std::vector<Writer>> writers_;  // by variable
+    ir::IdMap<uint32_t> writer_index_;          // plus one
+    std::vector<bool> live_stores_;
+    uint32_t store_count_ = 0;
     std::vector<const Inst*> work_;
 };
-
-}  // namespace
-
-std::map<Id, Bits> contents_of(const Program& program, const std::vector<const Function*>& functions,
-                               const std::map<Id, Bits>& given, bool variables) {
-    std::set<Id> open;  // variables that are reached otherwise than by whole loads and stores
-    for (const Function* function : functions)
-        for (const Block& block : function->blocks)
-            for (const Inst& inst : block.insts) {
-                bool first = true;
-                inst.for_each_id([&](Id id) {
-                    const bool pointer = first && (inst.op == Op::OpLoad || inst.op == Op::OpStore);
-                    first = false;
-                    if (!pointer) open.insert(id);
-                });
-            }
-    std::map<Id, Bits> contents = given;
-    std::map<Id, std::vector<std::pair<size_t, Id>>> values;  // variable or function -> function index, value
-    for (size_t i = 0; i < functions.size(); ++i)
-        for (const Block& block : functions[i]->blocks)
-            for (const Inst& inst : block.insts) {
-                if (variables && inst.op == Op::OpStore && !given.count(inst.ops[0]) && !open.count(inst.ops[0])) {
-                    const Inst* variable = program.def(inst.ops[0]);
-                    if (variable && variable->op == Op::OpVariable && variable->ops.size() == 1 &&
-                        static_cast<spv::StorageClass>(variable->ops[0]) == spv::StorageClass::Private)
-                        values[inst.ops[0]].push_back({i, inst.ops[1]});
-                } else if (inst.op == Op::OpReturnValue) {
-                    values[functions[i]->id()].push_back({i, inst.ops[0]});
-                }
-            }
-    // Nothing is taken for granted at first, so that every round's answer is true; later ones know more.
-    for (int round = 0; round < 2; ++round) {
-        std::vector<std::unique_ptr<BitAnalysis>> analyses(functions.size());
-        std::map<Id, Bits> next = given;
-        for (const auto& [id, list] : values) {
-            bool first = true;
-            Bits bits;
-            for (const auto& [function, value] : list) {
-                if (!analyses[function])
-                    analyses[function] = std::make_unique<BitAnalysis>(program, *functions[function], contents,
-                                                                          settles(*functions[function]));
-                const Bits one = analyses[function]->of(value);
-                bits = first ? one : both(bits, one);
-                first = false;
-            }
-            if (bits.zeros | bits.ones) next[id] = bits;
-        }
-        if (next == contents) break;
-        contents = std::move(next);
-    }
-    return contents;
-}
-
-namespace {
 
 std::vector<Function*> reachable(Program& program, Id main) {
     std::unordered_map<Id, Function*> functions;
@@ -487,17 +453,19 @@ void fold(Program& program, Id main, const std::map<Id, Bits>& given) {
     std::set<Id> constant;
     for (const auto& [variable, bits] : given)
         if (bits.constant(0xffffffffu)) constant.insert(variable);
-    // Twice: stores in branches that turn out dead say nothing about their variables.
-    for (int round = 0; round < 2; ++round) {
+    for (int round = 0; round < 3; ++round) {
         const std::vector<Function*> functions = reachable(program, main);
-        const std::map<Id, Bits> contents = contents_of(program, {functions.begin(), functions.end()}, given, true);
-        for (Function* function : functions) {
-            for (Block& block : function->blocks)
-                std::erase_if(block.insts, [&](const Inst& inst) {
-                    return inst.op == Op::OpStore && constant.count(inst.ops[0]) != 0;
-                });
-            Folder(program, *function, contents).run();
-        }
+        if (round == 0 && !constant.empty())
+            for (Function* function : functions)
+                for (Block& block : function->blocks)
+                    std::erase_if(block.insts, [&](const Inst& inst) {
+                        return inst.op == Op::OpStore && constant.count(inst.ops[0]) != 0;
+                    });
+        Values(program, functions, given).replace();
+        // Stores in branches that turn out dead say nothing about their variables: once more.
+        bool folded = false;
+        for (Function* function : functions) folded |= Branches(program, *function).fold();
+        if (!folded) break;
     }
 }
 
