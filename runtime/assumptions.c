@@ -51,6 +51,14 @@ void rtr_format_assumption(uint32_t bit, uint32_t offender, char* text, size_t s
              who, a->remedy, a->name);
 }
 
+uint32_t rtr_first_not_opaque(const VkAccelerationStructureInfoNV* info) {
+    uint32_t g;
+    for (g = 0; g < info->geometryCount; g++)
+        if (!(info->pGeometries[g].flags & VK_GEOMETRY_OPAQUE_BIT_NV))
+            return g < RTC_OFFENDER_NO_GEOMETRY ? g : RTC_OFFENDER_NO_GEOMETRY - 1;
+    return 0xffffffffu;
+}
+
 /* ---- What the host can see ------------------------------------------------------------- */
 
 VkResult rtrCmdDeclareScene(RtrRecorder r, uint32_t count, const RtrAccelerationStructure* structures) {

@@ -258,8 +258,7 @@ VkResult rtrCmdBuildAccelerationStructure(RtrRecorder recorder, const VkAccelera
                                           RtrAccelerationStructure dst, RtrAccelerationStructure src,
                                           VkBuffer scratch, VkDeviceSize scratchOffset) {
     RtrBuild b;
-    uint32_t g;
-    bool opaque = true;
+    bool opaque;
     VkResult r;
     memset(&b, 0, sizeof b);
     b.recorder = recorder;
@@ -287,12 +286,8 @@ VkResult rtrCmdBuildAccelerationStructure(RtrRecorder recorder, const VkAccelera
     if (dst->aabbs) b.push.flags |= RTR_BUILD_AABBS;
     if (info->flags & VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV)
         b.push.flags |= RTR_BUILD_KEEP_DEGENERATE;
-    b.push.not_opaque = 0xffffffffu;
-    for (g = info->geometryCount; g-- > 0;) {
-        if (info->pGeometries[g].flags & VK_GEOMETRY_OPAQUE_BIT_NV) continue;
-        opaque = false;
-        b.push.not_opaque = g < RTC_OFFENDER_NO_GEOMETRY ? g : RTC_OFFENDER_NO_GEOMETRY - 1;
-    }
+    b.push.not_opaque = rtr_first_not_opaque(info);
+    opaque = b.push.not_opaque == 0xffffffffu;
     b.push.facts = (dst->aabbs ? RTC_FACT_AABBS : 0u) | (opaque ? RTC_FACT_ALL_OPAQUE : 0u) |
                    (dst->heap ? 0u : RTC_FACT_ADDRESSES);
     if (update) {

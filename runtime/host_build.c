@@ -338,11 +338,12 @@ static void put_slots(HostBuild* b, bool aabbs) {
 
 static void put_header(const HostBuild* b, RtrAccelerationStructure dst, const Box* bounds, uint32_t total) {
     uint32_t* h = b->block;
-    bool opaque = true;
-    uint32_t g;
-    for (g = 0; g < b->info->geometryCount; g++)
-        opaque = opaque && (b->info->pGeometries[g].flags & VK_GEOMETRY_OPAQUE_BIT_NV);
+    const uint32_t not_opaque = rtr_first_not_opaque(b->info);
+    const bool opaque = not_opaque == 0xffffffffu;
+    uint32_t w;
     memset(h, 0, RTC_AS_HEADER_QUADS * RTC_QUAD_BYTES);
+    for (w = RTC_HDR_OFFENDERS; w < RTC_HDR_OFFENDERS_END; w++)
+        h[w] = 1u << (w - RTC_HDR_OFFENDERS) == RTC_FACT_ALL_OPAQUE ? not_opaque : 0xffffffffu;
     h[RTC_HDR_SELF_LO] = (uint32_t)dst->base;
     h[RTC_HDR_SELF_HI] = (uint32_t)(dst->base >> 32);
     h[RTC_HDR_MAGIC] = RTC_AS_MAGIC;

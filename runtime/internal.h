@@ -288,6 +288,8 @@ VkResult rtr_not_begun(RtrRecorder recorder, const char* function);
 /* ---- Assumptions (assumptions.c) -------------------------------------------------------- */
 /* A broken assumption as text: RTC_FACT_* and a word of RTC_HDR_OFFENDERS. */
 void rtr_format_assumption(uint32_t fact, uint32_t offender, char* text, size_t size);
+/* A bottom level's word of RTC_HDR_OFFENDERS for RTC_FACT_ALL_OPAQUE. */
+uint32_t rtr_first_not_opaque(const VkAccelerationStructureInfoNV* info);
 /* Whether the declared scene is what the pipeline's module assumes, as far as the host can see. */
 VkResult rtr_check_scene(RtrRecorder recorder, const struct RtrPipeline_T* pipeline);
 
