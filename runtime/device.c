@@ -118,6 +118,7 @@ VkResult rtrCreateDevice(const RtrDeviceCreateInfo* info, const VkAllocationCall
         r = VK_ERROR_FEATURE_NOT_PRESENT;
         goto fail;
     }
+    d->validation = info->validation;
     if (info->bufferDeviceAddress) {
         d->get_buffer_device_address =
             d->support.addressMode ? rtr_load_buffer_device_address(&d->vki, d->device) : NULL;

@@ -98,6 +98,7 @@ RtrGetBufferDeviceAddress rtr_load_buffer_device_address(const RtrInstanceTable*
     X(refit_nodes)      \
     X(prepare_launch)   \
     X(finish_launch)    \
+    X(validate_launch)  \
     X(probe)                \
     RTR_ADDRESS_KERNELS(X)
 /* Variants that follow device addresses; created only with bufferDeviceAddress. */
@@ -142,6 +143,7 @@ struct RtrDevice_T {
     VkDescriptorSetLayout array_layout; /* set 1 */
     VkDescriptorSetLayout empty_layout;
     VkPipelineLayout kernel_layout;
+    bool validation;
     RtrGetBufferDeviceAddress get_buffer_device_address; /* NULL: no address mode */
     VkPipeline kernels[RTR_KERNEL_COUNT];
 };
@@ -359,5 +361,15 @@ static inline VkDescriptorBufferInfo rtr_header_info(const struct RtrAcceleratio
 
 /* The version that serialised structures of this device and runtime carry. */
 void rtr_make_blob_version(const VkPhysicalDeviceIDProperties* id, uint8_t version[2 * VK_UUID_SIZE]);
+
+/* A launch whose parameters and control block are written, for validation. */
+typedef struct RtrLaunchCheck {
+    const RtrStridedBufferRegion* regions;  /* 4: raygen, miss, hit, callable */
+    VkDescriptorBufferInfo params, control; /* slots of parameters; the control block */
+    uint32_t slots, slot_words;
+    uint32_t identity;
+} RtrLaunchCheck;
+/* Records the checks; afterwards a launch with an error has no lanes. */
+VkResult rtr_validate_launch(RtrRecorder recorder, const RtrLaunchCheck* check);
 
 #endif /* RTR_INTERNAL_H_ */

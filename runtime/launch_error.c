@@ -25,6 +25,8 @@ VkResult rtrDecodeLaunchError(const uint32_t* words, RtrLaunchError* e) {
     return e->code == RTC_LAUNCH_ERROR_NONE ? VK_SUCCESS : VK_ERROR_UNKNOWN;
 }
 
+static const char* const k_regions[4] = {"raygen", "miss", "hit", "callable"};
+
 void rtrFormatLaunchError(const RtrLaunchError* e, char* text, size_t size) {
     char what[384];
     switch (e->code) {
@@ -40,8 +42,22 @@ void rtrFormatLaunchError(const RtrLaunchError* e, char* text, size_t size) {
                      "a callable below the pipeline's depth limit was dropped (rtc --max-callable-depth)");
             break;
         case RTC_LAUNCH_ERROR_BAD_HANDLE:
+            if (e->detail[1] & RTC_ERROR_RECORD) {
+                snprintf(what, sizeof what,
+                         "record %u of the %s region holds no handle of this pipeline (word read: 0x%08x)",
+                         e->detail[1] & RTC_ERROR_RECORD_MASK,
+                         k_regions[e->detail[1] >> RTC_ERROR_REGION_SHIFT & 3], e->detail[0]);
+                break;
+            }
             snprintf(what, sizeof what, "an SBT record holds no shader of this pipeline (word read: 0x%08x)",
                      e->detail[0]);
+            break;
+        case RTC_LAUNCH_ERROR_SBT_RANGE:
+            snprintf(what, sizeof what,
+                     "record %u of the %s region does not lie in its buffer, which ends %u bytes behind the "
+                     "region's start",
+                     e->detail[1] & RTC_ERROR_RECORD_MASK,
+                     k_regions[e->detail[1] >> RTC_ERROR_REGION_SHIFT & 3], e->detail[0]);
             break;
         case RTC_LAUNCH_ERROR_ABI:
             snprintf(
@@ -64,7 +80,9 @@ void rtrFormatLaunchError(const RtrLaunchError* e, char* text, size_t size) {
             snprintf(what, sizeof what, "unknown launch error %u", e->code);
             break;
     }
-    if (e->code == RTC_LAUNCH_ERROR_NONE || e->code == RTC_LAUNCH_ERROR_UNFINISHED) {
+    if (e->code == RTC_LAUNCH_ERROR_NONE || e->code == RTC_LAUNCH_ERROR_UNFINISHED ||
+        e->code == RTC_LAUNCH_ERROR_SBT_RANGE ||
+        (e->code == RTC_LAUNCH_ERROR_BAD_HANDLE && e->detail[1] & RTC_ERROR_RECORD)) {
         snprintf(text, size, "%s", what);
     } else {
         snprintf(text, size, "%s; %u events, the first at launch id (%u, %u, %u)", what, e->count,

@@ -142,7 +142,7 @@ static void place_sbt(Launch* l) {
         begin = l->p->reserved_in_app_set ? 0 : g->offset / 256 * 256;
         info->buffer = g->buffer;
         info->offset = begin;
-        info->range = g->size == VK_WHOLE_SIZE ? VK_WHOLE_SIZE : rtr_align(g->offset + g->size - begin, 4);
+        info->range = g->size == VK_WHOLE_SIZE || l->r->device->validation ? VK_WHOLE_SIZE : rtr_align(g->offset + g->size - begin, 4);
         l->sbt_offset[i] = g->offset - begin;
     }
 }
@@ -448,6 +448,18 @@ static VkResult prepare_indirect(const Launch* l) {
     return VK_SUCCESS;
 }
 
+static VkResult validate(const Launch* l) {
+    RtrDevice d = l->r->device;
+    RtrLaunchCheck c;
+    c.regions = l->region;
+    c.slots = l->shape.tiles * l->shape.rounds;
+    c.slot_words = param_stride(d) / 4;
+    c.params = (VkDescriptorBufferInfo){l->r->control, l->params, (VkDeviceSize)c.slots * param_stride(d)};
+    c.control = (VkDescriptorBufferInfo){l->r->control, l->control, control_bytes(l->shape.rounds)};
+    c.identity = l->p->header.identity;
+    return rtr_validate_launch(l->r, &c);
+}
+
 static VkResult record_tiles(Launch* l) {
     RtrRecorder r = l->r;
     const RtrDeviceTable* vk = &r->device->vk;
@@ -572,6 +584,7 @@ static VkResult trace(RtrRecorder r, const RtrStridedBufferRegion* raygen, const
     reset_control(&l, 0, true);
     after_transfer(r);
     if (indirect && (result = prepare_indirect(&l)) != VK_SUCCESS) return result;
+    if (r->device->validation && (result = validate(&l)) != VK_SUCCESS) return result;
     if ((result = record_tiles(&l)) != VK_SUCCESS) return result;
     r->launches[r->launch_count].offset = l.control;
     r->launches[r->launch_count].size = control_bytes(l.shape.rounds);

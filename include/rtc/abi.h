@@ -231,6 +231,12 @@
 #define RTC_LAUNCH_ERROR_ASSUMPTION 5u /* a compiled assumption is broken; detail: RTC_FACT_*, detail2: word of RTC_HDR_OFFENDERS */
 #define RTC_LAUNCH_ERROR_UNFINISHED 6u /* lanes were still suspended when rounds ran out; detail: lanes */
 #define RTC_LAUNCH_ERROR_STACK 7u /* internal: traversal or word stack overflow */
+#define RTC_LAUNCH_ERROR_SBT_RANGE 8u /* validation: an SBT region ends behind its buffer; detail: bytes there */
+/* DETAIL2 of errors found in the table before the launch: this bit, the region (0 raygen, 1
+ * miss, 2 hit, 3 callable), the record. */
+#define RTC_ERROR_RECORD 0x80000000u
+#define RTC_ERROR_REGION_SHIFT 28u
+#define RTC_ERROR_RECORD_MASK 0x0fffffffu
 
 /* ---- Reflection carried by a module ------------------------------------------
  * OpString "rtc.reflection:<index>/<count>:<base64>"; the decoded chunks joined

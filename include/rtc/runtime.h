@@ -147,6 +147,13 @@ typedef struct RtrDeviceCreateInfo {
      * 1.2 or VK_KHR_buffer_device_address). Acceleration structures can then be bound to
      * buffers, and modules linked for address mode run; heap mode stays available. */
     VkBool32 bufferDeviceAddress;
+    /* Deeper checks, at the cost of some dispatches a launch. Before each launch the device
+     * looks at its shader binding table: regions must end within their buffers, and the raygen
+     * record and every record of a region whose size is given (rtrCmdTraceRaysRegions) must be
+     * null or a handle of the pipeline. A launch that breaks this traces nothing and has the
+     * launch error SBT_RANGE or BAD_HANDLE with the region and record; and where sizes are not
+     * given (rtrCmdTraceRays), records outside the buffer act as null instead of being read. */
+    VkBool32 validation;
 } RtrDeviceCreateInfo;
 
 /* Prepares the runtime on a VkDevice: builds its kernels (some 30 small compute
@@ -402,7 +409,9 @@ RTR_API VkResult rtrResetRecorder(RtrRecorder recorder);
  * bytes each, offset a multiple of 16). scratchOffset: a multiple of 256. Scratch
  * contents need no initialisation. `src` is read only for updates: NULL or `dst`
  * refits in place.
- * Synchronisation is the application's, as in Vulkan: reads of inputs and reads and
+ * Builds recorded one after another need no barrier between them, even with one scratch:
+ * each ends with its own (compute to compute), so a top level may follow its bottom levels.
+ * Otherwise synchronisation is the application's, as in Vulkan: reads of inputs and reads and
  * writes of `dst` and scratch happen in COMPUTE_SHADER with SHADER_READ / SHADER_WRITE
  * (rtrTranslatePipelineStages/Access of the NV masks say the same).
  * PREFER_FAST_BUILD takes a Morton tree as it is; otherwise three passes of rotations bring

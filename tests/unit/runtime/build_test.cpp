@@ -329,6 +329,38 @@ TEST_P(BuildTest, GeometryFields) {
     EXPECT_EQ(seen[3], 20);
 }
 
+// Every build ends with its own barrier, so that builds one after another need none between
+// them, even when they share their scratch.
+TEST_P(BuildTest, BuildsInOneBatchNeedNoBarrier) {
+    Scene scene(*vk, rtr, 4 << 20);
+    std::vector<std::vector<VkGeometryNV>> geometry;
+    std::vector<VkAccelerationStructureInfoNV> infos(5, {VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV});
+    std::vector<RtrAccelerationStructure> all;
+    VkDeviceSize scratch_size = 0;
+    for (uint32_t i = 0; i < 5; i++) {
+        geometry.push_back({scene.triangles(soup(50 + 300 * i, i))});
+        infos[i].type = VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_NV;
+        infos[i].flags = flags();
+        infos[i].geometryCount = 1;
+        infos[i].pGeometries = geometry[i].data();
+        all.push_back(scene.create(infos[i]));
+        scratch_size = std::max(scratch_size, scene.scratch_size(all[i]));
+    }
+    Buffer scratch = vk->buffer(scratch_size, RTR_SCRATCH_BUFFER_USAGE);
+    scene.run([&] {
+        for (uint32_t i = 0; i < 5; i++)
+            EXPECT_EQ(rtrCmdBuildAccelerationStructure(scene.recorder, &infos[i], VK_NULL_HANDLE, 0, VK_FALSE,
+                                                       all[i], nullptr, scratch.handle, 0),
+                      VK_SUCCESS);
+    });
+    for (uint32_t i = 0; i < 5; i++) {
+        TreeFacts facts;
+        check_structure(scene, all[i], facts);
+        EXPECT_EQ(facts.slots.size(), 50 + 300 * i);
+    }
+    vk->destroy(scratch);
+}
+
 TEST_P(BuildTest, VertexFormats) {
     // 0x3c00 is 1.0 and 0xc000 -2.0 as half; SNORM 32767 is 1, -32767 is -1.
     struct Case {
