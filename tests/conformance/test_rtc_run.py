@@ -96,6 +96,24 @@ class RtcRun(unittest.TestCase):
         self.fails("is a buffer", "--case", self.case(5), "-o", os.path.join(self.folder.name, "out.png"))
         self.fails("unknown key", "--case", self.case(5, colour="red"))
 
+    def test_pictures_and_scene_files(self):
+        """Every kind of output from one run, over a scene of a file."""
+        obj = self.file("größe ü.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        paths = [os.path.join(self.folder.name, "out." + kind) for kind in ("png", "exr", "pfm", "bin", "json")]
+        outputs = [word for path in paths for word in ("-o", path)]
+        code, said = run(*HELLO, "--scene", obj, "--size", "8x4", *outputs)
+        self.assertEqual(code, 0, said)
+        self.assertRegex(said, r"(?m)^device: ")
+        heads = []
+        for path in paths:
+            with open(path, "rb") as file:
+                heads.append(file.read(4))
+        self.assertEqual(heads[:2], [b"\x89PNG", b"\x76\x2f\x31\x01"])
+        self.assertEqual(heads[2][:2], b"PF")
+        self.assertEqual(os.path.getsize(paths[3]) % 32, 0)  # 8 x 4 texels
+        with open(paths[4]) as file:
+            self.assertEqual(len(json.load(file)) % 32, 0)
+
     def test_ten_times_the_loop_iterations_lavapipe_has(self):
         """lavapipe 22.3 gives the loops of a group 65 535 iterations; these shaders need more than ten times that."""
         shaders = [self.file("long.rgen", LONG), self.file("long.rchit", LONG_HIT), self.file("long.rmiss", LONG_MISS)]
