@@ -1,6 +1,9 @@
 // --target-env= -O0 -O -Os -g --max-recursion-depth= --max-callable-depth= --reserved= --no-*.
 #include <nlohmann/json.hpp>
 
+#include <set>
+#include <string>
+
 #include "cli_fixture.h"
 
 using ::testing::HasSubstr;
@@ -143,6 +146,21 @@ TEST_F(Target, Compat) {
     const CliRun bad = rtc("old.rgen --compat=gdc2018");
     EXPECT_EQ(bad.status, 1);
     EXPECT_THAT(bad.err, HasSubstr("expected gdc2019"));
+}
+
+// Any hit, intersection and callable shaders among them; SampledBuffer is in every Vulkan device.
+TEST_F(Target, DefaultModulesDeclareNoOptionalCapability) {
+    for (const char* dialect : {"nv", "ext"}) {
+        const std::string text = disassembled(module("", dialect));
+        std::set<std::string> declared;
+        for (size_t at = 0; (at = text.find("OpCapability ", at)) != std::string::npos;) {
+            at += std::string("OpCapability ").size();
+            declared.insert(text.substr(at, text.find('\n', at) - at));
+        }
+        declared.erase("SampledBuffer");
+        EXPECT_EQ(declared, std::set<std::string>{"Shader"}) << dialect;
+        EXPECT_THAT(text, Not(HasSubstr("OpExtension"))) << dialect;
+    }
 }
 
 TEST_F(Target, NoResumable) {
