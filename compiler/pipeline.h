@@ -63,6 +63,10 @@ struct PipelineInput {
 
 enum class TargetEnv : uint32_t { Auto, Vulkan11, Vulkan12, Vulkan13 };
 enum class Optimization : uint32_t { None, Performance, Size };
+// How exact traversal is, see docs/accuracy.md. ExactFloat64 is Exact with the Float64 capability.
+enum class Accuracy : uint32_t { Watertight, Fast, Exact, ExactFloat64 };
+
+const char* accuracy_name(Accuracy accuracy);  // "watertight", "fast", "exact", "exact64"
 
 // How acceleration structure memory is reached (abi.h).
 enum class Addressing {
@@ -73,6 +77,7 @@ enum class Addressing {
 struct LinkOptions {
     TargetEnv target = TargetEnv::Auto;
     Optimization optimize = Optimization::None;
+    Accuracy accuracy = Accuracy::Watertight;
     bool debug_info = false;            // -g: keep OpLine, OpName, OpSource
     bool validate = true;               // run spirv-val on the result (traversal apart, see link/partial.cpp)
     bool trust_input = false;           // for measurements: the stages are valid, do not run spirv-val on them
@@ -159,6 +164,7 @@ struct Reflection {
     uint32_t assumptions = 0;  // bits of Assumption that the module was linked with
     std::vector<std::string> required_features;  // Vulkan feature names the module needs, e.g. "shaderFloat64"
     uint32_t flags = 0;  // RTC_MODULE_*
+    Accuracy accuracy = Accuracy::Watertight;
     uint32_t identity = 0;
     uint32_t reserved_set = 0, reserved_binding = 0, used_bindings = 0;
     uint32_t push_constant_bytes = 0;

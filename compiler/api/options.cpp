@@ -121,6 +121,28 @@ rtcc_status rtcc_options_set_optimization(rtcc_options_t options, rtcc_optimizat
     });
 }
 
+rtcc_status rtcc_options_set_accuracy(rtcc_options_t options, rtcc_accuracy accuracy) {
+    return set(options, [&](rtcc_options& o) {
+        switch (accuracy) {
+            case RTCC_ACCURACY_WATERTIGHT:
+                o.link.accuracy = rtc::Accuracy::Watertight;
+                break;
+            case RTCC_ACCURACY_FAST:
+                o.link.accuracy = rtc::Accuracy::Fast;
+                break;
+            case RTCC_ACCURACY_EXACT:
+                o.link.accuracy = rtc::Accuracy::Exact;
+                break;
+            case RTCC_ACCURACY_EXACT_FLOAT64:
+                o.link.accuracy = rtc::Accuracy::ExactFloat64;
+                break;
+            default:
+                return RTCC_STATUS_INVALID_ARGUMENT;
+        }
+        return RTCC_STATUS_SUCCESS;
+    });
+}
+
 rtcc_status rtcc_options_set_target_env(rtcc_options_t options, rtcc_target_env target) {
     return set(options, [&](rtcc_options& o) {
         switch (target) {

@@ -66,6 +66,7 @@ void view_reflection(rtcc_result& result) {
     view.required_feature_count = result.feature_names.size();
     view.required_features = result.feature_names.data();
     view.flags = r.flags;
+    view.accuracy = static_cast<rtcc_accuracy>(r.accuracy);
     view.identity = r.identity;
     view.reserved_set = r.reserved_set;
     view.reserved_binding = r.reserved_binding;

@@ -14,6 +14,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::array kStageNames = {"rgen", "rint", "rahit", "rchit", "rmiss", "rcall"};
+constexpr std::array kAccuracies = {"watertight", "fast", "exact", "exact64"};
 constexpr std::array kGroupNames = {"general", "triangles", "procedural"};
 
 struct Named {
@@ -126,6 +127,7 @@ Json to_json(const Reflection& r) {
         {"spirvVersion", spirv_version_text(r.spirv_version)},
         {"instructions", r.instruction_count},
         {"states", r.state_count},
+        {"accuracy", accuracy_name(r.accuracy)},
         {"maxRecursionDepth", r.max_recursion_depth},
         {"maxCallableDepth", r.max_callable_depth},
         {"stackWords", r.stack_words},
@@ -160,6 +162,9 @@ Reflection from_json(const Json& json) {
     r.spirv_version = spirv_version_from(json.at("spirvVersion").get<std::string>());
     json.at("instructions").get_to(r.instruction_count);
     json.at("states").get_to(r.state_count);
+    // Modules linked before there was a choice are watertight.
+    if (json.contains("accuracy"))
+        r.accuracy = static_cast<Accuracy>(index_of(kAccuracies, json.at("accuracy").get<std::string>()));
     json.at("maxRecursionDepth").get_to(r.max_recursion_depth);
     json.at("maxCallableDepth").get_to(r.max_callable_depth);
     json.at("stackWords").get_to(r.stack_words);
@@ -243,6 +248,8 @@ std::string last_component(const std::string& path) {
 }
 
 }  // namespace
+
+const char* accuracy_name(Accuracy accuracy) { return kAccuracies.at(static_cast<size_t>(accuracy)); }
 
 const char* group_kind_name(GroupKind kind) { return kGroupNames.at(static_cast<size_t>(kind)); }
 

@@ -2,7 +2,8 @@
 // from its JSON. The JSON object, keys in this order; integers unless said:
 //
 //   abiVersion, identity ("0x…"), flags (["resumable", "addressMode"]),
-//   spirvVersion ("1.3"), instructions, states, maxRecursionDepth, maxCallableDepth,
+//   spirvVersion ("1.3"), instructions, states, accuracy ("fast", "watertight", "exact", "exact64"),
+//   maxRecursionDepth, maxCallableDepth,
 //   stackWords, scratchWords, payloadWords, attributeWords, callableWords, pushConstantBytes,
 //   reserved {set, binding, bindings [{name, binding}]}   names: params, heapTexels, heap,
 //            sbtRaygen, sbtMiss, sbtHit, sbtCallable, control, scratch

@@ -16,8 +16,9 @@ struct TraversalModule {
     size_t count;
 };
 
-// "watertight" (the default tier) or "fast"; null for a tier that does not exist. `addresses`: the variant
-// that reads acceleration structures by device address (its RtcBase is a uvec2, not a uint).
+// "watertight" (the default tier), "fast", "exact" or "exact64" (needs Float64); null for a tier that does
+// not exist. `addresses`: the variant that reads acceleration structures by device address (its RtcBase is a
+// uvec2, not a uint).
 const TraversalModule* find_traversal_module(std::string_view tier, bool addresses = false);
 
 // Link constants: SpecIds of bool constants that the linker freezes.

@@ -117,6 +117,14 @@ typedef enum rtcc_compat {
     RTCC_COMPAT_MAX_ENUM = 0x7fffffff
 } rtcc_compat;
 
+typedef enum rtcc_accuracy {
+    RTCC_ACCURACY_WATERTIGHT = 0,    /* no cracks, no double hits on shared edges */
+    RTCC_ACCURACY_FAST = 1,          /* cheapest tests; rays leak at edges and vertices */
+    RTCC_ACCURACY_EXACT = 2,         /* what exact arithmetic hits, in its order */
+    RTCC_ACCURACY_EXACT_FLOAT64 = 3, /* the same; the module needs shaderFloat64 */
+    RTCC_ACCURACY_MAX_ENUM = 0x7fffffff
+} rtcc_accuracy;
+
 typedef enum rtcc_optimization {
     RTCC_OPTIMIZATION_NONE = 0,
     RTCC_OPTIMIZATION_PERFORMANCE = 1,
@@ -196,6 +204,9 @@ RTCC_EXPORT rtcc_status rtcc_options_set_glsl_version(rtcc_options_t options, co
 /* Keeps names, lines and source text in the output (-g). Default 0. Reports have lines either way. */
 RTCC_EXPORT rtcc_status rtcc_options_set_debug_info(rtcc_options_t options, int enable);
 RTCC_EXPORT rtcc_status rtcc_options_set_optimization(rtcc_options_t options, rtcc_optimization level);
+/* How exact traversal is: --accuracy. The default is RTCC_ACCURACY_WATERTIGHT. What each
+ * promises and costs: docs/accuracy.md. */
+RTCC_EXPORT rtcc_status rtcc_options_set_accuracy(rtcc_options_t options, rtcc_accuracy accuracy);
 /* What the finished module may use. Independent of how the stages were written. */
 RTCC_EXPORT rtcc_status rtcc_options_set_target_env(rtcc_options_t options, rtcc_target_env target);
 /* Trace calls nested in trace calls: 1 (only ray generation traces) to 31. Default 1. */
@@ -418,6 +429,7 @@ typedef struct rtcc_reflection {
     size_t required_feature_count; /* Vulkan feature names, e.g. "shaderFloat64" */
     const char* const* required_features;
     uint32_t flags;    /* RTC_MODULE_* */
+    rtcc_accuracy accuracy;
     uint32_t identity; /* word 7 of the handles */
     uint32_t reserved_set;
     uint32_t reserved_binding;

@@ -35,6 +35,7 @@ Options make_options(const JobPipeline& pipeline, const CompileOptions& wanted) 
                 options.get(), wanted.optimize ? RTCC_OPTIMIZATION_PERFORMANCE : RTCC_OPTIMIZATION_NONE),
             "the optimisation level");
     require(rtcc_options_set_debug_info(options.get(), wanted.debug_info), "debug info");
+    require(rtcc_options_set_accuracy(options.get(), wanted.accuracy), "the accuracy");
     require(rtcc_options_set_resumable(options.get(), wanted.resumable), "resumable");
     require(rtcc_options_set_specialize(options.get(), wanted.specialize), "specialize");
     require(rtcc_options_assume(options.get(), wanted.assume.c_str()), "an assumption");

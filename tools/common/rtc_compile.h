@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include <rtc/compiler.h>
+
 #include "ray_tracing_job.h"
 
 namespace rtc::tools {
@@ -15,6 +17,7 @@ struct CompileOptions {
     bool resumable = true;
     bool specialize = true;  // remove what cannot be needed
     std::string assume;      // promises about scenes, as rtc --assume takes them
+    rtcc_accuracy accuracy = RTCC_ACCURACY_WATERTIGHT;
     int reserved_set = -1;
     uint32_t reserved_binding = 0;
 };

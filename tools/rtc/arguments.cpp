@@ -20,6 +20,8 @@ bool starts_with(std::string_view text, std::string_view prefix) {
     return text.substr(0, prefix.size()) == prefix;
 }
 
+constexpr const char* kAccuracies[] = {"watertight", "fast", "exact", "exact64"};
+
 [[noreturn]] void invalid_value(std::string_view option, std::string_view value) {
     throw UsageError("invalid value '" + std::string(value) + "' in '" + std::string(option) + "=" +
                      std::string(value) + "'");
@@ -190,7 +192,7 @@ class Parser {
         for (std::string_view known :
              {"--addressing", "--assume", "--compat", "--hit-group", "--stage", "--scene-profile", "--pipeline",
               "--reflect", "--target-env", "--max-recursion-depth",
-              "--max-callable-depth", "--reserved", "--dump-after"})
+              "--max-callable-depth", "--reserved", "--dump-after", "--accuracy"})
             if (name == known) return true;
         return false;
     }
@@ -240,6 +242,11 @@ class Parser {
             if (value != "gdc2019")
                 throw UsageError("invalid value '" + value + "' in '--compat=" + value + "': expected gdc2019");
             out_.compat = RTCC_COMPAT_GDC2019;
+        } else if (name == "--accuracy") {
+            out_.accuracy = parse_accuracy(value);
+            if (!out_.accuracy)
+                throw UsageError("invalid value '" + value + "' in '--accuracy=" + value +
+                                 "': expected fast, watertight, exact or exact64");
         } else if (name == "--max-recursion-depth") {
             out_.recursion_depth = number_between(name, value, 1, 31);
         } else if (name == "--max-callable-depth") {
@@ -323,6 +330,16 @@ class Parser {
 };
 
 }  // namespace
+
+std::optional<rtcc_accuracy> parse_accuracy(const std::string& name) {
+    for (size_t i = 0; i < std::size(kAccuracies); ++i)
+        if (name == kAccuracies[i]) return static_cast<rtcc_accuracy>(i);
+    return std::nullopt;
+}
+
+const char* accuracy_name(rtcc_accuracy accuracy) {
+    return static_cast<size_t>(accuracy) < std::size(kAccuracies) ? kAccuracies[accuracy] : "unknown";
+}
 
 InputArgument parse_stage_argument(const std::string& text) {
     const std::string where = "invalid '--stage " + text + "': ";

@@ -51,6 +51,7 @@ struct Arguments {
     rtcc_target_env target = RTCC_TARGET_AUTO;
     rtcc_addressing addressing = RTCC_ADDRESSING_HEAP;
     rtcc_compat compat = RTCC_COMPAT_NONE;
+    std::optional<rtcc_accuracy> accuracy;
     std::optional<uint32_t> recursion_depth, callable_depth;
     std::optional<int32_t> reserved_set;
     uint32_t reserved_binding = 0;
@@ -63,6 +64,10 @@ Arguments parse_arguments(const std::vector<std::string>& words);
 
 // "NAME=KIND:FILE[:ENTRY][,spec.ID=VALUE…]"
 InputArgument parse_stage_argument(const std::string& text);
+
+// RTCC_ACCURACY_* of "fast", "watertight", "exact" or "exact64"; nullopt: none of them.
+std::optional<rtcc_accuracy> parse_accuracy(const std::string& name);
+const char* accuracy_name(rtcc_accuracy accuracy);
 
 // Replaces @FILE by the words in that file (blanks separate, quotes and backslashes keep).
 std::vector<std::string> expand_response_files(const std::vector<std::string>& words);

@@ -14,6 +14,10 @@ An input file of - is the standard input. Files are GLSL (GL_NV_ray_tracing or
 GL_EXT_ray_tracing) or SPIR-V, told apart by SPIR-V's magic number.
 
 Options:
+  --accuracy=<tier> Speed for accuracy: fast (leaks at edges), watertight (the
+                    default: no cracks), exact (the triangle that exact
+                    arithmetic hits), exact64 (the same with Float64: faster
+                    where the device has it).
   --addressing=<mode>
                     How acceleration structures are reached: heap (default;
                     plain Vulkan 1.1) or address (needs bufferDeviceAddress).
@@ -114,7 +118,8 @@ A pipeline file:
     "groups": [ {"name": "camera", "general": "camera"},
                 {"name": "glass", "closestHit": "c", "anyHit": "a"} ] }
 "kind", "entry", "spec" and "groups" may be left out. Beside "stages":
-"assume": ["opaque", ...] and "sceneProfile": "file.json".
+"assume": ["opaque", ...], "sceneProfile": "file.json" and
+"accuracy": "exact", which yields to --accuracy.
 
 Exit status: 0 success, 1 errors in the inputs or on the command line (as glslc).
 )",

@@ -55,6 +55,7 @@ Options make_options(const Arguments& arguments) {
     rtcc_options_set_debug_info(o, arguments.debug_info);
     rtcc_options_set_optimization(o, arguments.optimization);
     rtcc_options_set_target_env(o, arguments.target);
+    if (arguments.accuracy) rtcc_options_set_accuracy(o, *arguments.accuracy);
     if (arguments.recursion_depth) rtcc_options_set_max_recursion_depth(o, *arguments.recursion_depth);
     if (arguments.callable_depth) rtcc_options_set_max_callable_depth(o, *arguments.callable_depth);
     if (arguments.reserved_set)
@@ -87,6 +88,7 @@ class Program {
             ok = reflect_module();
         } else {
             const Plan plan = make_plan(arguments_, files_);
+            if (plan.accuracy && !arguments_.accuracy) rtcc_options_set_accuracy(options_.get(), *plan.accuracy);
             switch (arguments_.mode) {
                 case Mode::Link:
                     ok = link(plan);

@@ -4,7 +4,7 @@
 //                  "spec": {"0": 4, "1": 0.5, "2": true}}, … ],
 //     "groups": [ {"name": "camera", "general": "camera"},
 //                 {"name": "glass", "closestHit": "c", "anyHit": "a", "intersection": "i"} ],
-//     "assume": ["opaque", …], "sceneProfile": "scene.json" }
+//     "assume": ["opaque", …], "sceneProfile": "scene.json", "accuracy": "exact" }
 //
 // "name" defaults to the file's last component, "kind" to what the file says, "groups"
 // to what the command line would make of the stages. Files are relative to the JSON file.
@@ -40,6 +40,8 @@ class Reader {
                 assume(check(member.value, Kind::Array));
             else if (member.name == "sceneProfile")
                 plan_.scene_profiles.push_back(resolved(string(member.value)));
+            else if (member.name == "accuracy")
+                accuracy(member.value);
             else
                 unknown(member);
         }
@@ -96,6 +98,13 @@ class Reader {
             if (!known) json_error(path_, item.place, "no assumption is named \"" + name + "\"");
             plan_.assume.push_back(name);
         }
+    }
+
+    void accuracy(const JsonValue& value) {
+        plan_.accuracy = parse_accuracy(string(value));
+        if (!plan_.accuracy)
+            json_error(path_, value.place,
+                       "\"" + value.text + "\" is no accuracy: expected fast, watertight, exact or exact64");
     }
 
     void stage(const JsonValue& value) {

@@ -35,6 +35,7 @@ struct Plan {
     std::vector<PlannedGroup> groups;
     std::vector<std::string> description_files;  // the --pipeline files
     std::vector<std::string> assume, scene_profiles;  // of pipeline files
+    std::optional<rtcc_accuracy> accuracy;       // what they ask for
 
     int find_stage(const std::string& name) const;
     // Throws InputError `where` + text when the name is taken.

@@ -1,5 +1,7 @@
 #include "report.h"
 
+#include "arguments.h"
+
 #include <algorithm>
 
 namespace cli {
@@ -25,7 +27,8 @@ std::string report_text(const rtcc_reflection& r, const std::string& module) {
                       "\n";
     out += "  recursion depth " + std::to_string(r.max_recursion_depth) + ", callable depth " +
            std::to_string(r.max_callable_depth) + ", " +
-           (r.flags & RTC_MODULE_RESUMABLE ? "resumable" : "not resumable") + "\n";
+           (r.flags & RTC_MODULE_RESUMABLE ? "resumable" : "not resumable") + ", accuracy " +
+           accuracy_name(r.accuracy) + "\n";
     out += "  stack " + std::to_string(r.stack_words * 4) + " bytes, scratch " +
            std::to_string(r.scratch_words * 4) + " bytes, payload " + std::to_string(r.payload_words * 4) +
            " bytes, hit attributes " + std::to_string(r.attribute_words * 4) + " bytes, callable data " +

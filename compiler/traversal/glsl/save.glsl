@@ -42,6 +42,9 @@ void rtc_trace_save(uint first_word) {
         rtc_scratch_store(w + 28u, rtc_hit_attr6);
         rtc_scratch_store(w + 29u, rtc_hit_attr7);
     }
+#ifdef RTC_TIER_EXACT
+    rtc_scratch_store(w + 31u, rtc_hit_slot);
+#endif
     w += RTC_TRACE_STATE_HEADER;
     for (uint i = 0u; i < rtc_trav_sp; ++i) {
         rtc_scratch_store(w + i, rtc_stack_get(i));
@@ -90,6 +93,9 @@ void rtc_trace_restore(uint first_word) {
         rtc_hit_attr6 = rtc_scratch_load(w + 28u);
         rtc_hit_attr7 = rtc_scratch_load(w + 29u);
     }
+#ifdef RTC_TIER_EXACT
+    rtc_hit_slot = rtc_scratch_load(w + 31u);
+#endif
     w += RTC_TRACE_STATE_HEADER;
     for (uint i = 0u; i < min(rtc_trav_sp, RTC_TRAVERSAL_STACK); ++i) {
         rtc_stack_set(i, rtc_scratch_load(w + i));

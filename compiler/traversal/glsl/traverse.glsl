@@ -112,6 +112,7 @@ void rtc_trace_accept() {
         rtc_hit_attr6 = rtc_cand_attr6;
         rtc_hit_attr7 = rtc_cand_attr7;
     }
+    rtc_accepted();
     rtc_trav_tmax = rtc_cand_t * rtc_trav_t_up;
     if ((rtc_ray_flags & RTC_RAY_TERMINATE_ON_FIRST_HIT) != 0u) {
         rtc_trav_cur = RTC_REF_DONE;
@@ -133,7 +134,7 @@ uint rtc_opacity(uint slot_flags) {
 bool rtc_report_begin(float t, uint kind) {
     rtc_cand_t = t;
     rtc_cand_kind = kind;
-    return rtc_cand_opaque != 2u && t >= rtc_ray_tmin && t <= rtc_hit_t;
+    return rtc_cand_opaque != 2u && rtc_report_in_range(t);
 }
 
 // Entry distance of a box, and whether the ray meets it in [tmin, tmax].
@@ -172,8 +173,7 @@ uint rtc_test_triangle(uint slot) {
     vec3 v0 = uintBitsToFloat(q0.xyz);
     vec3 v1 = uintBitsToFloat(q1.xyz);
     vec3 v2 = uintBitsToFloat(q2.xyz);
-    if (rtc_triangle(v0, v1, v2, t, b1, b2, front) && t > rtc_trav_tmin &&
-        t < rtc_trav_tmax) {
+    if (rtc_triangle(v0, v1, v2, t, b1, b2, front) && rtc_in_range(t, slot, q0.w, q1.w)) {
         front = front != ((rtc_trav_bits & RTC_LEVEL_FLIP) != 0u);
         uint opacity = rtc_opacity(q1.w);
         uint cull = front ? RTC_LEVEL_CULL_FRONT : RTC_LEVEL_CULL_BACK;

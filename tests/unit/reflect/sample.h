@@ -27,6 +27,7 @@ inline rtc::Reflection sample_reflection() {
                      {"tint", "C:\\shaders\\t.rcall", 9, true, 24, {"color", "(temporary)"}}};
     r.required_features = {"shaderFloat64", "shaderInt64"};
     r.flags = RTC_MODULE_RESUMABLE;
+    r.accuracy = rtc::Accuracy::Exact;
     r.identity = 0xdeadbeef;
     r.reserved_set = 4;
     r.reserved_binding = 10;

@@ -18,6 +18,12 @@ constexpr uint32_t kWatertight[] = {
 constexpr uint32_t kFast[] = {
 #include "lab_fast.inc"
 };
+constexpr uint32_t kExact[] = {
+#include "lab_exact.inc"
+};
+constexpr uint32_t kExact64[] = {
+#include "lab_exact64.inc"
+};
 constexpr uint32_t kContracted[] = {
 #include "lab_contracted.inc"
 };
@@ -30,6 +36,8 @@ std::vector<uint32_t> module_words(Variant variant) {
     std::vector<uint32_t> words;
     if (variant == Variant::Watertight) words.assign(std::begin(kWatertight), std::end(kWatertight));
     if (variant == Variant::Fast) words.assign(std::begin(kFast), std::end(kFast));
+    if (variant == Variant::Exact) words.assign(std::begin(kExact), std::end(kExact));
+    if (variant == Variant::Exact64) words.assign(std::begin(kExact64), std::end(kExact64));
     if (variant == Variant::Probe) words.assign(std::begin(kProbe), std::end(kProbe));
     if (variant == Variant::Contracted) {
         words.assign(std::begin(kContracted), std::end(kContracted));
@@ -47,14 +55,22 @@ constexpr uint32_t kResultWords = 16;
 }  // namespace
 
 Variant parse_variant(std::string_view name) {
-    if (name == "watertight") return Variant::Watertight;
-    if (name == "fast") return Variant::Fast;
-    if (name == "contracted") return Variant::Contracted;
-    throw tools::Error("unknown tier \"" + std::string(name) + "\": watertight, fast or contracted");
+    for (Variant v : {Variant::Watertight, Variant::Fast, Variant::Exact, Variant::Exact64, Variant::Contracted})
+        if (name == variant_name(v)) return v;
+    throw tools::Error("unknown tier \"" + std::string(name) +
+                       "\": fast, watertight, exact, exact64 or contracted");
 }
 
 const char* variant_name(Variant variant) {
-    return variant == Variant::Watertight ? "watertight" : (variant == Variant::Fast ? "fast" : "contracted");
+    switch (variant) {
+        case Variant::Watertight: return "watertight";
+        case Variant::Fast: return "fast";
+        case Variant::Exact: return "exact";
+        case Variant::Exact64: return "exact64";
+        case Variant::Contracted: return "contracted";
+        case Variant::Probe: return "probe";
+    }
+    return "";
 }
 
 struct DeviceTracer::State {
@@ -212,7 +228,23 @@ std::vector<RayResult> DeviceTracer::trace(const std::vector<Ray>& rays) {
     params[RTC_PARAM_DEPTH] = 1;
     params[RTC_PARAM_LANE_COUNT] = lanes;
     static_assert(sizeof(RayResult) == kResultWords * 4);
-    dispatch(params, rays.data(), rays.size() * sizeof(Ray), lanes, lanes / 64, 1);
+    if (state_->options.pause) {
+        std::vector<Ray> paused = rays;
+        for (Ray& ray : paused) ray.sbt |= kPause;
+        double total = 0;
+        uint32_t errors = 0;
+        for (uint32_t round = 0; round == 0 || control()[RTC_CTRL_SUSPENDED] != 0; ++round) {
+            if (round == 10000) throw tools::Error("rays do not end");
+            params[RTC_PARAM_ROUND] = round == 0 ? 0 : 1;
+            dispatch(params, paused.data(), paused.size() * sizeof(Ray), lanes, lanes / 64, 1);
+            total += seconds;
+            errors += error_count;
+        }
+        seconds = total;
+        error_count = errors;
+    } else {
+        dispatch(params, rays.data(), rays.size() * sizeof(Ray), lanes, lanes / 64, 1);
+    }
     std::vector<RayResult> results(rays.size());
     std::memcpy(results.data(), state_->results.mapped, results.size() * sizeof(RayResult));
     return results;

@@ -28,6 +28,7 @@ enum RayMode : uint32_t {
     kNoReport = 4u << 8,   // intersection reports nothing
     kNullRoot = 8u << 8,
     kBottomRoot = 16u << 8,  // trace a bottom level
+    kPause = 32u << 8,       // what TracerOptions::pause sets
 };
 
 struct RayResult {
@@ -42,7 +43,7 @@ struct RayResult {
 constexpr uint32_t kNoInstance = 0xffffffffu;
 
 // Probe traces nothing: it asks for lanes and records (lab_probe.comp).
-enum class Variant { Watertight, Fast, Contracted, Probe };
+enum class Variant { Watertight, Fast, Exact, Exact64, Contracted, Probe };
 Variant parse_variant(std::string_view name);  // throws tools::Error
 const char* variant_name(Variant variant);
 
@@ -52,6 +53,8 @@ struct TracerOptions {
     bool while_while = false;
     uint32_t shared_stack = 0;
     uint32_t step_budget = 0xffffffffu;
+    // Lanes that use up their budget end and go on in another dispatch, as a resumable pipeline's do.
+    bool pause = false;
     bool any_hit = true, aabbs = true, triangles = true, resumable = true;
 };
 
@@ -60,8 +63,10 @@ class DeviceTracer {
     DeviceTracer(const tools::Context& context, const TracerOptions& options);
     ~DeviceTracer();
 
-    // What a context needs for a variant: Float64 for the negative control.
-    static bool needs_float64(Variant variant) { return variant == Variant::Contracted; }
+    // Float64: for the negative control and exact64.
+    static bool needs_float64(Variant variant) {
+        return variant == Variant::Contracted || variant == Variant::Exact64;
+    }
 
     void set_scene(const HostScene& scene);
     std::vector<RayResult> trace(const std::vector<Ray>& rays);

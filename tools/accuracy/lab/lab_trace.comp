@@ -22,19 +22,22 @@ struct LabResult {
     uint kind, instance, primitive, geometry, record;
     uint attr0, attr1, attr7;
     uint front, back, boxes; // candidates seen
-    uint turns, suspensions;
+    uint turns, suspensions; // LAB_PENDING: to be continued
     uint mismatches; // candidates whose object ray differs from traversal's
     uint last_opaque;
 };
 
 layout(set = 1, binding = 0, std430) readonly buffer LabRays { LabRay lab_rays[]; };
-layout(set = 1, binding = 1, std430) writeonly buffer LabResults { LabResult lab_results[]; };
+layout(set = 1, binding = 1, std430) buffer LabResults { LabResult lab_results[]; };
 
 const uint LAB_IGNORE = 1u; // any-hit: ignore all
 const uint LAB_TERMINATE = 2u; // any-hit: terminateRay
 const uint LAB_NO_REPORT = 4u; // intersection: report nothing
 const uint LAB_ROOT_NULL = 8u;
 const uint LAB_ROOT_BOTTOM = 16u; // a root that is no top level
+const uint LAB_PAUSE = 32u; // a suspended lane ends, and a later dispatch goes on
+
+const uint LAB_PENDING = 0x80000000u; // in `suspensions`
 
 #ifdef LAB_FUSED
 float lab_fused(const float a, const float b, const float c) { return float(double(a) * double(b) + double(c)); }
@@ -66,9 +69,23 @@ void main() {
         rtc_ray_direction = r.direction;
         rtc_ray_tmax = r.tmax;
         uint front = 0u, back = 0u, boxes = 0u, suspensions = 0u, mismatches = 0u, turns = 0u;
-        rtc_trace_begin();
         uint step = RTC_STEP_RUNNING;
-        do {
+        if (rtc_param(RTC_PARAM_ROUND) == 0u) {
+            rtc_trace_begin();
+        } else if ((lab_results[rtc_launch_id.x].suspensions & LAB_PENDING) == 0u) {
+            step = RTC_STEP_DONE;
+        } else {
+            LabResult before = lab_results[rtc_launch_id.x];
+            front = before.front;
+            back = before.back;
+            boxes = before.boxes;
+            turns = before.turns;
+            mismatches = before.mismatches;
+            suspensions = before.suspensions & ~LAB_PENDING;
+            rtc_trace_restore(0u);
+        }
+        bool asleep = step == RTC_STEP_DONE;
+        while (step != RTC_STEP_DONE) {
             step = rtc_trace_step();
             if (step == RTC_STEP_TRIANGLE) {
                 lab_check_object_ray(mismatches);
@@ -105,8 +122,13 @@ void main() {
             } else if (step == RTC_STEP_SUSPEND) {
                 // As if the lane ended here and another one took over.
                 suspensions++;
-                turns += rtc_turns;
                 rtc_trace_save(0u);
+                if ((mode & LAB_PAUSE) != 0u) {
+                    suspensions |= LAB_PENDING;
+                    rtc_suspend();
+                    break;
+                }
+                turns += rtc_turns;
                 rtc_ray_root = 0xdeadu;
                 rtc_hit_t = -1.0;
                 rtc_trav_sp = 77u;
@@ -121,7 +143,7 @@ void main() {
                 rtc_trace_restore(0u);
                 rtc_turns = 0u;
             }
-        } while (step != RTC_STEP_DONE);
+        }
         LabResult result;
         result.t = rtc_hit_t;
         result.kind = rtc_hit_kind;
@@ -144,6 +166,8 @@ void main() {
             result.t = lab_fused(result.t, result.t, result.t);
         }
 #endif
-        lab_results[rtc_launch_id.x] = result;
+        if (!asleep) {
+            lab_results[rtc_launch_id.x] = result;
+        }
     }
 }

@@ -1,0 +1,190 @@
+// Exact sums of products of three floats, in integers: no float property of
+// the device matters here, neither rounding nor flushing nor range.
+//
+// A float is m 2^(s - 149) with an integer m < 2^24 and s = 0 .. 253, so a
+// product of three is an integer below 2^72 times 2^(s - 447), s = 0 .. 759.
+// An accumulator (Kulisch) holds such products in limbs of 24 bits, each in a
+// signed word of its own: 48 products add at most 48 * 2^24 < 2^30 to a limb,
+// so carries wait until the end. 759 / 24 + 4 limbs reach the highest bit, two
+// more take the carries. Only limbs within the operands' exponents are touched.
+const uint RTC_WIDE_LIMBS = 37u;
+const uint RTC_WIDE_MASK = 0x00ffffffu;
+
+int rtc_wide[4u * RTC_WIDE_LIMBS];
+
+// After rtc_wide_det, per accumulator: sign and range of limbs that are not 0.
+int rtc_wide_sign[4];
+uint rtc_wide_low[4];
+uint rtc_wide_high[4];
+
+uint rtc_mantissa(uint bits) {
+    uint fraction = bits & 0x007fffffu;
+    return (bits & 0x7f800000u) == 0u ? fraction : fraction | 0x00800000u;
+}
+
+uint rtc_scale(uint bits) { return max((bits >> 23u) & 255u, 1u) - 1u; }
+
+uint rtc_pick(uvec3 v, uint i) { return mix(mix(v.z, v.y, i == 1u), v.x, i == 0u); }
+
+// accumulator += x y z, or -= where `negate` is the sign bit.
+void rtc_wide_add(uint base, uint x, uint y, uint z, uint negate) {
+    uint mx = rtc_mantissa(x), my = rtc_mantissa(y), mz = rtc_mantissa(z);
+    if (mx != 0u && my != 0u && mz != 0u) {
+        uint shift = rtc_scale(x) + rtc_scale(y) + rtc_scale(z);
+        uint limb = shift / 24u;
+        uint r = shift - 24u * limb;
+        uint h0, l0, h1, l1, h2, l2, carry;
+        umulExtended(mx, my, h0, l0); // 48 bits
+        umulExtended(l0, mz, h1, l1);
+        umulExtended(h0, mz, h2, l2); // 72 bits: l1, h1 + l2, h2 + carry
+        uint w1 = uaddCarry(h1, l2, carry);
+        uint w2 = h2 + carry;
+        // 95 bits when shifted by r <= 23; a shift by 32 would be undefined.
+        w2 = (w2 << r) | ((w1 >> 1u) >> (31u - r));
+        w1 = (w1 << r) | ((l1 >> 1u) >> (31u - r));
+        uint w0 = l1 << r;
+        int sign = ((x ^ y ^ z ^ negate) & 0x80000000u) != 0u ? -1 : 1;
+        uint at = base + limb;
+        rtc_wide[at] += sign * int(w0 & RTC_WIDE_MASK);
+        rtc_wide[at + 1u] += sign * int(((w0 >> 24u) | (w1 << 8u)) & RTC_WIDE_MASK);
+        rtc_wide[at + 2u] += sign * int(((w1 >> 16u) | (w2 << 16u)) & RTC_WIDE_MASK);
+        rtc_wide[at + 3u] += sign * int(w2 >> 8u);
+    }
+}
+
+// Largest scale of six numbers, or smallest of those that are not 0 (255: none).
+uint rtc_wide_top_scale(uvec3 a, uvec3 b) {
+    uint high = max(max(rtc_scale(a.x), rtc_scale(a.y)), rtc_scale(a.z));
+    return max(max(max(high, rtc_scale(b.x)), rtc_scale(b.y)), rtc_scale(b.z));
+}
+
+uint rtc_wide_scale(uint bits) { return mix(rtc_scale(bits), 255u, (bits << 1u) == 0u); }
+
+uint rtc_wide_bottom_scale(uvec3 a, uvec3 b) {
+    uint low = min(min(rtc_wide_scale(a.x), rtc_wide_scale(a.y)), rtc_wide_scale(a.z));
+    return min(min(min(low, rtc_wide_scale(b.x)), rtc_wide_scale(b.y)), rtc_wide_scale(b.z));
+}
+
+// det(x1 - x2, y1 - y2, z1 - z2), bits of floats, into an accumulator, where
+// at least two of x2, y2, z2 are equal or all but one 0, so that a
+// determinant with two of them is 0: four choices of vectors times six
+// permutations, of which two a turn. Limbs are left as magnitude.
+void rtc_wide_det(uint which, uvec3 x1, uvec3 x2, uvec3 y1, uvec3 y2, uvec3 z1, uvec3 z2) {
+    uint base = which * RTC_WIDE_LIMBS;
+    uint bottom = rtc_wide_bottom_scale(x1, x2) + rtc_wide_bottom_scale(y1, y2) + rtc_wide_bottom_scale(z1, z2);
+    uint top = rtc_wide_top_scale(x1, x2) + rtc_wide_top_scale(y1, y2) + rtc_wide_top_scale(z1, z2);
+    bottom = min(bottom, top) / 24u;
+    top = top / 24u + 5u; // four limbs of a product, and carries
+    for (uint i = bottom; i <= top; ++i) {
+        rtc_wide[base + i] = 0;
+    }
+    uint turns = rtc_wide_top_scale(x2, x2) == 0u ? 9u : 12u; // x2 is 0 but for t's numerator
+    for (uint i = 0u; i < turns; ++i) {
+        uint choice = i / 3u;
+        uint p = i - 3u * choice;
+        uint next = p == 2u ? 0u : p + 1u;
+        uint last = p == 0u ? 2u : p - 1u;
+        uint negate = choice == 0u ? 0u : 0x80000000u;
+        uint x = rtc_pick(mix(x1, x2, bvec3(choice == 3u)), p);
+        uvec3 y = mix(y1, y2, bvec3(choice == 1u));
+        uvec3 z = mix(z1, z2, bvec3(choice == 2u));
+        rtc_wide_add(base, x, rtc_pick(y, next), rtc_pick(z, last), negate);
+        rtc_wide_add(base, x, rtc_pick(y, last), rtc_pick(z, next), negate ^ 0x80000000u);
+    }
+    // Carries; the last one tells the sign. A negative number's limbs are its
+    // two's complement, which the second round turns into the magnitude.
+    int sign = 1;
+    uint low = RTC_WIDE_LIMBS;
+    uint high = 0u;
+    for (uint round = 0u; round < 2u; ++round) {
+        int carry = 0;
+        int flip = round == 0u ? 1 : -1;
+        low = RTC_WIDE_LIMBS;
+        high = 0u;
+        for (uint i = bottom; i <= top; ++i) {
+            int limb = flip * rtc_wide[base + i] + carry;
+            carry = limb >> 24;
+            limb = limb & int(RTC_WIDE_MASK);
+            rtc_wide[base + i] = limb;
+            low = limb != 0 ? min(low, i) : low;
+            high = limb != 0 ? i : high;
+        }
+        if (round == 0u) {
+            sign = carry < 0 ? -1 : 1;
+            round += carry < 0 ? 0u : 1u;
+        }
+    }
+    rtc_wide_sign[which] = low == RTC_WIDE_LIMBS ? 0 : sign;
+    rtc_wide_low[which] = low;
+    rtc_wide_high[which] = high;
+    rtc_turns += turns + 3u * (top + 1u - bottom) + 2u;
+}
+
+// q 2^e, also where 2^e alone is no float.
+float rtc_ldexp(float q, int e) {
+    int half_way = clamp(e, -500, 500) / 4;
+    float step = rtc_power(127 + half_way);
+    return (((q * step) * step) * step) * rtc_power(127 + clamp(e, -500, 500) - 3 * half_way);
+}
+
+// The leading 49 to 72 bits as a pair, in units of 2^(24 (high - 1)).
+vec2 rtc_wide_top(uint which) {
+    uint at = which * RTC_WIDE_LIMBS + rtc_wide_high[which];
+    float first = float(rtc_wide[at]) * 16777216.0;
+    uint below = rtc_wide_high[which] - rtc_wide_low[which];
+    float second = below > 0u ? float(rtc_wide[at - 1u]) : 0.0;
+    float third = below > 1u ? float(rtc_wide[at - 2u]) * 5.9604644775e-8 : 0.0;
+    vec2 sum = rtc_two_sum(first, second);
+    return rtc_quick_sum(sum.x, sum.y + third);
+}
+
+// Accumulator 0 over accumulator 1, off by less than an ulp.
+float rtc_wide_quotient() {
+    float q = rtc_pair_quotient(rtc_wide_top(0u), rtc_wide_top(1u));
+    q = rtc_ldexp(q, 24 * (int(rtc_wide_high[0]) - int(rtc_wide_high[1])));
+    return rtc_wide_sign[0] * rtc_wide_sign[1] < 0 ? -q : (rtc_wide_sign[0] == 0 ? 0.0 : q);
+}
+
+// A limb of a number, 0 outside it.
+uint rtc_wide_limb(uint which, uint i) {
+    bool inside = i >= rtc_wide_low[which] && i <= rtc_wide_high[which];
+    uint limb = uint(rtc_wide[which * RTC_WIDE_LIMBS + i]);
+    return inside ? limb : 0u;
+}
+
+// Sign of 0 / 1 - 2 / 3, the divisors not being 0.
+int rtc_wide_compare() {
+    int left = rtc_wide_sign[0] * rtc_wide_sign[1];
+    int right = rtc_wide_sign[2] * rtc_wide_sign[3];
+    int result = left > right ? 1 : (left < right ? -1 : 0);
+    if (left == right && left != 0) {
+        // |0| |3| - |2| |1|, column by column. The halves of 37 products of 48
+        // bits sum up to less than 2^30.
+        uint first = min(rtc_wide_low[0], rtc_wide_low[2]), last = max(rtc_wide_high[0], rtc_wide_high[2]);
+        uint low = min(rtc_wide_low[1], rtc_wide_low[3]), high = max(rtc_wide_high[1], rtc_wide_high[3]);
+        int carry = 0, above = 0;
+        int any = 0;
+        for (uint k = first + low; k <= last + high; ++k) {
+            int lows = 0, highs = 0;
+            uint from = k > high ? max(first, k - high) : first;
+            uint to = min(last, k - low);
+            for (uint i = from; i <= to; ++i) {
+                uint a_high, a_low, b_high, b_low;
+                umulExtended(rtc_wide_limb(0u, i), rtc_wide_limb(3u, k - i), a_high, a_low);
+                umulExtended(rtc_wide_limb(2u, i), rtc_wide_limb(1u, k - i), b_high, b_low);
+                lows += int(a_low & RTC_WIDE_MASK) - int(b_low & RTC_WIDE_MASK);
+                highs += int((a_low >> 24u) | (a_high << 8u)) - int((b_low >> 24u) | (b_high << 8u));
+                rtc_turns++;
+            }
+            int column = (lows + above) + carry;
+            any |= column & int(RTC_WIDE_MASK);
+            carry = column >> 24;
+            above = highs;
+            rtc_turns++;
+        }
+        carry += above;
+        result = carry < 0 ? -1 : (carry > 0 || any != 0 ? 1 : 0);
+        result = result * left;
+    }
+    return result;
+}

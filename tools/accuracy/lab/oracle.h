@@ -1,0 +1,44 @@
+// What tier `exact` promises, computed on the host: the first hit of exact
+// arithmetic under the rules of compiler/traversal/glsl/exact.glsl. Fast enough
+// to keep up with a device: it walks the scene's own trees in double, decides
+// what double can prove and leaves the rest to rationals.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "device_tracer.h"
+#include "host_scene.h"
+
+namespace rtc::lab {
+
+struct OracleHit {
+    uint32_t instance = 0, geometry = 0, primitive = 0;
+    double t = 0;         // nearest double or its neighbour, in the ray's own units
+    bool tied = false;    // another triangle at the same exact t lost by its number
+    bool on_edge = false; // the ray met an edge or vertex of some triangle exactly
+};
+
+// Decisions that needed rationals.
+struct OracleCounts {
+    uint64_t tests = 0, edges = 0, orders = 0;
+};
+
+class Oracle {
+  public:
+    // The scene must outlive the oracle; triangles only.
+    explicit Oracle(const HostScene& scene) : scene_(scene) {}
+
+    // Thread-safe but for `counts`. Flags and masks of the ray are not looked at.
+    std::optional<OracleHit> first_hit(const Ray& ray, OracleCounts* counts = nullptr) const;
+
+  private:
+    const HostScene& scene_;
+};
+
+// first_hit of all rays on all cores.
+std::vector<std::optional<OracleHit>> first_hits(const Oracle& oracle, const std::vector<Ray>& rays,
+                                                 OracleCounts* counts = nullptr);
+
+}  // namespace rtc::lab
