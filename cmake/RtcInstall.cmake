@@ -36,6 +36,9 @@ function(rtc_install_component component library description)
 endfunction()
 
 if(TARGET rtcc)
+  # For the shaders that are compiled: #include "rtc/spawn.glsl".
+  install(FILES ${PROJECT_SOURCE_DIR}/include/rtc/spawn.glsl
+    COMPONENT compiler DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/rtc)
   rtc_install_component(compiler rtcc "Links ray tracing shaders into one Vulkan compute shader" rtcc)
   list(APPEND RTC_INSTALLED compiler)
 endif()
