@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "command_line.h"
+#include "cases.h"
 #include "error.h"
 #include "experiments.h"
 
@@ -60,6 +61,25 @@ std::string markdown(const Report& report, const std::string& device) {
         }
         out << '\n';
     }
+    if (!report.agreement.empty()) {
+        out << "First hits against exact arithmetic, with the rules of tier exact. *Differ*: missed, invented, another "
+               "triangle; *of these* where denormals are at stake.\n\n"
+            << "| axis | cases | rays | hits | ties | on an edge | missed | invented | other | of these denormal | t p50 | "
+               "p99 | p99.9 | max |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+        for (const AgreementRow& r : report.agreement) {
+            std::snprintf(line, sizeof line,
+                          "| %s | %llu | %llu | %llu | %llu | %llu | %llu | %llu | %llu | %llu | %.2f | %.2f | %.2f | %.3g |\n",
+                          r.axis.c_str(), (unsigned long long)r.cases, (unsigned long long)r.rays,
+                          (unsigned long long)r.hits, (unsigned long long)r.ties, (unsigned long long)r.on_edge,
+                          (unsigned long long)r.missed, (unsigned long long)r.invented,
+                          (unsigned long long)r.inverted, (unsigned long long)r.denormal, r.t_p50, r.t_p99,
+                          r.t_p999, r.t_max);
+            out << line;
+        }
+        out << '\n';
+        for (const AgreementRow& r : report.agreement)
+            if (!r.first.empty()) out << "- first difference, " << r.axis << ", " << r.first << '\n';
+    }
     if (!report.exact.empty()) {
         out << "First hits against exact arithmetic; t error in ulps of the exact t.\n\n"
             << "| scene | rays | hits | missed | invented | other triangle | exact ties | farthest from an "
@@ -105,6 +125,23 @@ nlohmann::ordered_json to_json(const Report& report) {
         json["culls"].push_back(
             {{"mesh", r.mesh}, {"place", r.place}, {"rays", r.rays}, {"culled", r.culls}});
     }
+    for (const AgreementRow& r : report.agreement) {
+        json["agreement"].push_back({{"axis", r.axis},
+                                     {"cases", r.cases},
+                                     {"rays", r.rays},
+                                     {"hits", r.hits},
+                                     {"ties", r.ties},
+                                     {"on_edge", r.on_edge},
+                                     {"missed", r.missed},
+                                     {"invented", r.invented},
+                                     {"other", r.inverted},
+                                     {"of_these_denormal", r.denormal},
+                                     {"t_ulp_p50", r.t_p50},
+                                     {"t_ulp_p99", r.t_p99},
+                                     {"t_ulp_p99_9", r.t_p999},
+                                     {"t_ulp_max", r.t_max},
+                                     {"first_difference", r.first}});
+    }
     for (const ExactRow& r : report.exact) {
         json["exact"].push_back({{"scene", r.scene},
                                  {"rays", r.rays},
@@ -144,6 +181,13 @@ bool verdict(const Report& report) {
                      (unsigned long long)broken);
         return false;
     }
+    uint64_t different = 0;
+    for (const AgreementRow& r : report.agreement) different += r.different() - r.denormal;
+    if ((report.variant == Variant::Exact || report.variant == Variant::Exact64) && different) {
+        std::fprintf(stderr, "rtc-accuracy: error: %s: %llu hits differ from exact arithmetic\n",
+                     variant_name(report.variant), (unsigned long long)different);
+        return false;
+    }
     if (report.variant == Variant::Contracted && !report.leaks.empty() && total == 0) {
         std::fprintf(stderr,
                      "rtc-accuracy: error: the negative control does not leak: this measurement is blind\n");
@@ -156,10 +200,10 @@ int run(int argc, char** argv) {
     CLI::App app{"Measures leaks, exactness and cost of rtc's traversal on a device."};
     std::vector<std::string> tiers = {"watertight"}, axes = {"mesh"};
     std::string device, json_path, markdown_path;
-    uint64_t rays = 1 << 17, exact_rays = 0, cost_rays = 0, cull_rays = 0;
+    uint64_t rays = 1 << 17, exact_rays = 0, cost_rays = 0, cull_rays = 0, agreement_rays = 0;
     bool validate = false, while_while = false, storage = false;
     uint32_t shared_stack = 0;
-    app.add_option("--tier", tiers, "watertight, fast, contracted (the negative control) or all")
+    app.add_option("--tier", tiers, "watertight, fast, exact, exact64, contracted (the negative control) or all")
         ->delimiter(',');
     app.add_option("--device", device, "device index or part of its name");
     app.add_option("--axes", axes, "mesh, offset, size, aspect, distance, transform, zeros, all or none")
@@ -167,6 +211,8 @@ int run(int argc, char** argv) {
     app.add_option("--rays", rays, "rays per point and aim");
     app.add_option("--culls", cull_rays, "rays per place for false box culls");
     app.add_option("--exact", exact_rays, "rays per scene against exact arithmetic");
+    app.add_option("--agreement", agreement_rays,
+                   "rays over all extremes, in equal shares, against the exact oracle");
     app.add_option("--cost", cost_rays, "rays per workload for timing");
     app.add_option("--json", json_path, "write all figures");
     app.add_option("--markdown", markdown_path, "write the tables");
@@ -175,7 +221,7 @@ int run(int argc, char** argv) {
     app.add_flag("--storage", storage, "fetch nodes from a storage buffer");
     app.add_option("--shared-stack", shared_stack, "stack entries in shared memory");
     if (const int status = rtc::tools::parse_command_line(app, "rtc-accuracy", argc, argv); status >= 0) return status;
-    if (tiers == std::vector<std::string>{"all"}) tiers = {"watertight", "fast", "contracted"};
+    if (tiers == std::vector<std::string>{"all"}) tiers = {"watertight", "fast", "exact", "exact64", "contracted"};
     if (axes == std::vector<std::string>{"all"}) axes = axis_names();
     if (axes == std::vector<std::string>{"none"}) axes.clear();
     if (rays == 0) throw Error("--rays must not be 0");
@@ -213,6 +259,16 @@ int run(int argc, char** argv) {
         }
         for (const std::string& axis : axes) measure_axis(tracer, axis, rays, report.leaks);
         if (cull_rays) measure_culls(tracer, cull_rays, report.culls);
+        if (agreement_rays) {
+            // Exact decisions of a whole group can take more turns than lavapipe 22.3 allows a dispatch.
+            TracerOptions pausing = options;
+            pausing.step_budget = 6000;
+            pausing.pause = true;
+            DeviceTracer pausing_tracer(context, pausing);
+            const auto& names = exact_axis_names();
+            for (const std::string& axis : names)
+                measure_agreement(pausing_tracer, axis, agreement_rays / names.size(), report.agreement);
+        }
         if (exact_rays) measure_exact(tracer, exact_rays, report.exact);
         const std::string tables = markdown(report, name);
         std::fputs(tables.c_str(), stdout);

@@ -50,6 +50,7 @@ TEST(OptionsTest, BadValuesAreRefusedAndChangeNothing) {
     EXPECT_EQ(rtcc_options_set_target_env(o, static_cast<rtcc_target_env>(9)), RTCC_STATUS_INVALID_ARGUMENT);
     EXPECT_EQ(rtcc_options_set_optimization(o, static_cast<rtcc_optimization>(9)),
               RTCC_STATUS_INVALID_ARGUMENT);
+    EXPECT_EQ(rtcc_options_set_accuracy(o, static_cast<rtcc_accuracy>(9)), RTCC_STATUS_INVALID_ARGUMENT);
     EXPECT_EQ(rtcc_options_add_include_directory(o, nullptr), RTCC_STATUS_INVALID_ARGUMENT);
     EXPECT_EQ(rtcc_options_set_debug_info(nullptr, 1), RTCC_STATUS_INVALID_ARGUMENT);
     EXPECT_EQ(rtcc_result_status(compile_stage(kNeedsMacro, "a.rmiss", o).get()), RTCC_STATUS_SUCCESS);
