@@ -231,7 +231,7 @@ void measure_exact(DeviceTracer& tracer, uint64_t rays, std::vector<ExactRow>& r
 
 void measure_agreement(DeviceTracer& tracer, const std::string& axis, uint64_t total,
                        std::vector<AgreementRow>& rows) {
-    constexpr uint64_t kBatch = 1 << 18;
+    constexpr uint64_t kBatch = 1 << 20;
     const std::vector<ExactCase> cases = exact_cases(axis);
     AgreementRow row{.axis = axis, .cases = cases.size()};
     // Errors of t in steps of 1/64 ulp; more than 64 ulps share the last step but for the maximum.
@@ -242,7 +242,11 @@ void measure_agreement(DeviceTracer& tracer, const std::string& axis, uint64_t t
         const Oracle oracle(scene);
         const uint64_t share = (total + cases.size() - 1) / cases.size();
         for (uint64_t first = 0; first < share; first += kBatch) {
-            const std::vector<Ray> rays = c.rays(first, std::min(kBatch, share - first));
+            std::vector<Ray> rays(std::min(kBatch, share - first));
+            in_parallel(rays.size(), [&](size_t begin, size_t end) {
+                const std::vector<Ray> part = c.rays(first + begin, end - begin);
+                std::copy(part.begin(), part.end(), rays.begin() + std::ptrdiff_t(begin));
+            });
             const auto got = tracer.trace(rays);
             const auto expected = first_hits(oracle, rays);
             row.rays += rays.size();

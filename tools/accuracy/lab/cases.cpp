@@ -11,8 +11,6 @@
 namespace rtc::lab {
 namespace {
 
-using Random = std::mt19937_64;
-
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kDenormal = std::numeric_limits<float>::denorm_min();
 

@@ -35,7 +35,7 @@ HostScene leak_scene(const LeakCase& c, const BuildOptions& options) {
 }
 
 std::vector<Ray> leak_rays(const LeakCase& c, uint64_t count, uint64_t batch) {
-    std::mt19937_64 random(c.seed * 1000003 + batch);
+    Random random(c.seed * 1000003 + batch);
     std::normal_distribution<double> normal;
     std::vector<Ray> rays(count);
     for (Ray& ray : rays) {

@@ -178,7 +178,7 @@ const char* aim_name(Aim aim) {
     return aim == Aim::Interior ? "interior" : (aim == Aim::Edge ? "edge" : "vertex");
 }
 
-Vec3 aim_point(const IndexedMesh& mesh, Aim aim, std::mt19937_64& random) {
+Vec3 aim_point(const IndexedMesh& mesh, Aim aim, Random& random) {
     const auto& t = mesh.triangles[random() % mesh.triangles.size()];
     const uint32_t k = uint32_t(random() % 3);
     const Vec3 a = mesh.vertices[t[k]], b = mesh.vertices[t[(k + 1) % 3]], c = mesh.vertices[t[(k + 2) % 3]];

@@ -31,10 +31,28 @@ IndexedMesh make_plane(uint32_t n);
 // shared vertices move together.
 IndexedMesh moved(const IndexedMesh& mesh, double scale, const std::array<double, 3>& offset);
 
+// splitmix64: a generator that costs nothing to seed, so that every ray can have its own.
+class Random {
+  public:
+    using result_type = uint64_t;
+    explicit Random(uint64_t seed) : state_(seed) {}
+    static constexpr uint64_t min() { return 0; }
+    static constexpr uint64_t max() { return ~uint64_t(0); }
+    uint64_t operator()() {
+        uint64_t z = state_ += 0x9e3779b97f4a7c15ull;
+        z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
+        z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
+        return z ^ (z >> 31);
+    }
+
+  private:
+    uint64_t state_;
+};
+
 enum class Aim { Interior, Edge, Vertex };
 const char* aim_name(Aim aim);
 
 // A random point of a random triangle, of one of its edges, or a vertex.
-Vec3 aim_point(const IndexedMesh& mesh, Aim aim, std::mt19937_64& random);
+Vec3 aim_point(const IndexedMesh& mesh, Aim aim, Random& random);
 
 }  // namespace rtc::lab

@@ -261,28 +261,31 @@ std::optional<OracleHit> Oracle::first_hit(const Ray& ray, OracleCounts* counts_
     return best;
 }
 
+void in_parallel(size_t count, const std::function<void(size_t, size_t)>& work) {
+    constexpr size_t kChunk = 4096;
+    std::atomic<size_t> next = 0;
+    auto loop = [&] {
+        for (size_t from; (from = next.fetch_add(kChunk)) < count;) work(from, std::min(count, from + kChunk));
+    };
+    std::vector<std::thread> threads;
+    for (unsigned i = 1; i < std::max(1u, std::thread::hardware_concurrency()); ++i) threads.emplace_back(loop);
+    loop();
+    for (std::thread& thread : threads) thread.join();
+}
+
 std::vector<std::optional<OracleHit>> first_hits(const Oracle& oracle, const std::vector<Ray>& rays,
                                                  OracleCounts* counts) {
     std::vector<std::optional<OracleHit>> hits(rays.size());
-    std::atomic<size_t> next = 0;
     std::mutex mutex;
-    constexpr size_t kChunk = 4096;
-    auto work = [&] {
+    in_parallel(rays.size(), [&](size_t begin, size_t end) {
         OracleCounts mine;
-        for (size_t from; (from = next.fetch_add(kChunk)) < rays.size();) {
-            for (size_t i = from; i < std::min(rays.size(), from + kChunk); ++i)
-                hits[i] = oracle.first_hit(rays[i], &mine);
-        }
-        const std::lock_guard lock(mutex);
+        for (size_t i = begin; i < end; ++i) hits[i] = oracle.first_hit(rays[i], &mine);
         if (!counts) return;
+        const std::lock_guard lock(mutex);
         counts->tests += mine.tests;
         counts->edges += mine.edges;
         counts->orders += mine.orders;
-    };
-    std::vector<std::thread> threads;
-    for (unsigned i = 1; i < std::max(1u, std::thread::hardware_concurrency()); ++i) threads.emplace_back(work);
-    work();
-    for (std::thread& thread : threads) thread.join();
+    });
     return hits;
 }
 

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -36,6 +37,9 @@ class Oracle {
   private:
     const HostScene& scene_;
 };
+
+// Calls work(begin, end) for parts of 0 .. count on all cores.
+void in_parallel(size_t count, const std::function<void(size_t begin, size_t end)>& work);
 
 // first_hit of all rays on all cores.
 std::vector<std::optional<OracleHit>> first_hits(const Oracle& oracle, const std::vector<Ray>& rays,
