@@ -8,5 +8,6 @@ namespace rtc::bench {
 void add_compile_command(CLI::App& app);
 void add_trace_command(CLI::App& app);
 void add_specialise_command(CLI::App& app);
+void add_build_command(CLI::App& app);
 
 }  // namespace rtc::bench

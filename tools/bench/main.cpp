@@ -11,6 +11,7 @@ int main(int argc, char** argv) {
 #ifdef RTC_BENCH_TRACE
     rtc::bench::add_trace_command(app);
     rtc::bench::add_specialise_command(app);
+    rtc::bench::add_build_command(app);
 #endif
     try {
         CLI11_PARSE(app, argc, argv);

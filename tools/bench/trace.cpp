@@ -9,6 +9,7 @@
 #include <map>
 #include <memory>
 
+#include "bench_device.h"
 #include "bench_scenes.h"
 #include "commands.h"
 #include "error.h"
@@ -41,49 +42,16 @@ double seconds_since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// Device extensions of the device the options choose.
-bool device_has(const std::string& wanted, const char* extension) {
-    const tools::DeviceList list;
-    const tools::DeviceInfo& chosen = tools::select_device(list.devices, wanted);
-    uint32_t count = 0;
-    vkEnumerateDeviceExtensionProperties(chosen.physical, nullptr, &count, nullptr);
-    std::vector<VkExtensionProperties> properties(count);
-    vkEnumerateDeviceExtensionProperties(chosen.physical, nullptr, &count, properties.data());
-    return std::any_of(properties.begin(), properties.end(), [&](const VkExtensionProperties& property) {
-        return std::strcmp(property.extensionName, extension) == 0;
-    });
-}
-
-std::vector<Kind> native_kinds(const Options& options) {
-    std::vector<Kind> kinds;
-    for (const std::string& name : options.native) {
-        if (name == "none") continue;
-        if (name == "nv" || (name == "auto" && device_has(options.device, VK_NV_RAY_TRACING_EXTENSION_NAME)))
-            kinds.push_back(Kind::Nv);
-        if (name == "khr" ||
-            (name == "auto" && device_has(options.device, VK_KHR_RAY_TRACING_PIPELINE_EXTENSION_NAME)))
-            kinds.push_back(Kind::Khr);
-    }
-    return kinds;
-}
-
 class Bench {
   public:
     explicit Bench(const Options& options)
-        : options_(options), kinds_(native_kinds(options)), modules_(options.save_modules) {
-        ContextOptions context_options;
-        context_options.device = options.device;
-        context_options.validate = options.validate;
-        for (Kind kind : kinds_) {
-            requirements_.push_back(std::make_unique<native::Requirements>(kind));
-            requirements_.back()->apply(context_options);
-        }
-        context_ = std::make_unique<Context>(context_options);
-        device_ = std::make_unique<RtcDevice>(*context_);
-        timer_ = std::make_unique<tools::GpuTimer>(*context_);
-        const bool cpu = context_->properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
-        report_.device = tools::describe_device(context_->properties, context_->driver);
-        report_.width = options.width ? options.width : cpu ? 256 : 2048;
+        : options_(options),
+          modules_(options.save_modules),
+          bench_device_(options.device, options.native, options.validate),
+          context_(*bench_device_.context),
+          device_(*bench_device_.rtc) {
+        report_.device = bench_device_.description;
+        report_.width = options.width ? options.width : bench_device_.is_cpu() ? 256 : 2048;
         report_.height = options.height ? options.height : report_.width;
         for (const std::string& text : options.variants) variants_.push_back(parse_variant(text));
         if (variants_.empty()) variants_.push_back(parse_variant(""));
@@ -94,7 +62,7 @@ class Bench {
         for (const std::string& name : options_.scenes) run_scene(name);
         std::printf("\n%s\n%s", heading("Geometric means").c_str(), summary_table(report_).c_str());
         write_files();
-        context_->require_silent_validation();
+        context_.require_silent_validation();
         return std::none_of(report_.rows.begin(), report_.rows.end(),
                             [](const TraceRow& row) { return !row.native && row.times.empty(); });
     }
@@ -107,7 +75,7 @@ class Bench {
         std::map<bool, std::shared_ptr<RtcScene>> structures;
         for (const TraceVariant& variant : variants_)
             if (std::shared_ptr<RtcScene>& built = structures[variant.fast_build]; !built)
-                built = std::make_shared<RtcScene>(*device_, scene, variant.fast_build);
+                built = std::make_shared<RtcScene>(device_, scene, variant.fast_build);
         for (const std::string& workload : options_.workloads)
             run_workload(name, scene, structures, make_workload(workload, report_.width, report_.height));
         std::string title = name + ": " + std::to_string(scene.triangle_count()) + " triangles";
@@ -149,12 +117,12 @@ class Bench {
             }
         };
         reference_.reset();
-        for (Kind kind : kinds_)
+        for (Kind kind : bench_device_.kinds)
             add(kind == Kind::Khr ? "native KHR" : "native NV", true,
-                [&] { return make_native_runner(*context_, scene, workload, kind); });
+                [&] { return make_native_runner(context_, scene, workload, kind); });
         for (const TraceVariant& variant : variants_)
             add(variant.name, false, [&] {
-                return make_rtc_runner(*device_, scene, structures.at(variant.fast_build), workload, variant,
+                return make_rtc_runner(device_, scene, structures.at(variant.fast_build), workload, variant,
                                        modules_);
             });
         measure(entries);
@@ -167,7 +135,7 @@ class Bench {
         if (is_native && too_slow(entry, row)) return;
         clear(entry.runner->job());
         launch(*entry.runner, 1, 0);
-        tools::RenderResult result = result_of(*context_, entry.runner->job(), 1);
+        tools::RenderResult result = result_of(context_, entry.runner->job(), 1);
         const bool counts = result.rays > 0;  // "primary" writes no colour and no count
         row.rays = counts ? result.rays : double(row.width) * row.height;
         if (!reference_) {
@@ -188,7 +156,7 @@ class Bench {
             entry.runner->set_size(size, size);
             clear(entry.runner->job());
             const double first = launch(*entry.runner, 1, 0);
-            const double counted = entry.runner->job().rays(*context_);
+            const double counted = entry.runner->job().rays(context_);
             const double time = first * 4 > options_.native_limit ? first : launch(*entry.runner, 1, 0);
             if (time * 4 <= options_.native_limit) continue;
             row.rays = counted > 0 ? counted : double(size) * size;
@@ -211,20 +179,17 @@ class Bench {
                 report_.rows[entry.row].times.push_back(launch(*entry.runner, entry.batch, 0));
     }
 
-    // Seconds of one launch, by the device's clock.
+    // Seconds of one launch.
     double launch(TraceRunner& runner, uint32_t batch, uint32_t sample) {
-        context_->run([&](VkCommandBuffer commands) {
-            timer_->reset(commands);
-            timer_->begin(commands);
+        const double seconds = bench_device_.time([&](VkCommandBuffer commands) {
             for (uint32_t i = 0; i < batch; ++i) runner.record(commands, sample);
-            timer_->end(commands);
         });
         runner.finish();
-        return timer_->seconds() / batch;
+        return seconds / batch;
     }
 
     void clear(const tools::RenderJob& job) {
-        context_->run([&](VkCommandBuffer commands) {
+        context_.run([&](VkCommandBuffer commands) {
             const VkClearColorValue zero{};
             const VkImageSubresourceRange whole{VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
             for (const tools::Image* image : {&job.accumulation, &job.gbuffer})
@@ -248,12 +213,10 @@ class Bench {
     }
 
     const Options options_;
-    std::vector<Kind> kinds_;
     ModuleCache modules_;
-    std::vector<std::unique_ptr<native::Requirements>> requirements_;
-    std::unique_ptr<Context> context_;
-    std::unique_ptr<RtcDevice> device_;
-    std::unique_ptr<tools::GpuTimer> timer_;
+    BenchDevice bench_device_;
+    const Context& context_;
+    const RtcDevice& device_;
     std::vector<TraceVariant> variants_;
     TraceReport report_;
     std::vector<std::string> scene_texts_;

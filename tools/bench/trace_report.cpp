@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "bench_device.h"
+
 namespace rtc::bench {
 namespace {
 
@@ -64,13 +66,7 @@ Mean mean_of(const TraceReport& report, const std::string& runner, const std::st
 
 }  // namespace
 
-double TraceRow::median() const {
-    if (times.empty()) return 0;
-    std::vector<double> sorted = times;
-    std::sort(sorted.begin(), sorted.end());
-    const size_t middle = sorted.size() / 2;
-    return sorted.size() % 2 ? sorted[middle] : 0.5 * (sorted[middle - 1] + sorted[middle]);
-}
+double TraceRow::median() const { return median_of(times); }
 
 double TraceRow::least() const { return times.empty() ? 0 : *std::min_element(times.begin(), times.end()); }
 

@@ -1,0 +1,38 @@
+// What the build benchmark measures: a builder with one structure, rtc's or the device's own.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "../native/executor.h"
+#include "rtc_device.h"
+#include "scene.h"
+
+namespace rtc::bench {
+
+struct BuildInput {
+    tools::Mesh mesh;
+    // Not empty: instances of the mesh, and the top level over them is what is measured.
+    std::vector<glm::mat4> instances;
+    bool fast_build = false, low_memory = false, allow_update = false;
+};
+
+class BuildSubject {
+  public:
+    explicit BuildSubject(std::string name_) : name(std::move(name_)) {}
+    virtual ~BuildSubject() = default;
+    virtual void record_build(VkCommandBuffer commands) = 0;
+    virtual void record_update(VkCommandBuffer commands) = 0;  // in place; needs allow_update
+    // After a build: bytes a compacted copy would take.
+    virtual VkDeviceSize compacted_bytes() = 0;
+
+    const std::string name;
+    VkDeviceSize bytes = 0, scratch_bytes = 0, update_scratch_bytes = 0;
+};
+
+std::unique_ptr<BuildSubject> make_rtc_subject(const tools::RtcDevice& device, const BuildInput& input);
+std::unique_ptr<BuildSubject> make_khr_subject(const tools::Context& context, const BuildInput& input);
+std::unique_ptr<BuildSubject> make_nv_subject(const tools::Context& context, const BuildInput& input);
+
+}  // namespace rtc::bench
