@@ -49,6 +49,8 @@ struct SuiteOptions {
     size_t shard = 0, shards = 1;                         // only every shards-th case, from `shard` on
     std::string save_oracle, oracle;                      // folders of outputs of the native run
 };
+// Case files under a folder whose path below it holds `filter`, or fits it as a pattern of * and ?; sorted.
+std::vector<std::string> suite_files(const std::string& folder, const std::string& filter);
 // Exit status: 0 all passed.
 int run_suite(const SuiteOptions& options);
 

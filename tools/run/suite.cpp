@@ -1,6 +1,7 @@
 // Many cases, each as often as there are variants. The work happens in a child
 // process: a driver that crashes or hangs costs one case, and the next child
 // goes on behind it.
+#include <fnmatch.h>
 #include <poll.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -34,7 +35,14 @@ struct Outcome {
     double seconds = 0;
 };
 
-std::vector<std::string> find_cases(const std::string& folder, const std::string& filter) {
+bool fits(const std::string& name, const std::string& filter) {
+    if (filter.find_first_of("*?") == std::string::npos) return name.find(filter) != std::string::npos;
+    return fnmatch(filter.c_str(), name.c_str(), 0) == 0 || fnmatch((filter + ".json").c_str(), name.c_str(), 0) == 0;
+}
+
+}  // namespace
+
+std::vector<std::string> suite_files(const std::string& folder, const std::string& filter) {
     std::vector<std::string> files;
     std::filesystem::path root(folder);
     if (std::filesystem::is_regular_file(root)) return {folder};
@@ -42,12 +50,13 @@ std::vector<std::string> find_cases(const std::string& folder, const std::string
     for (const auto& entry : std::filesystem::recursive_directory_iterator(root))
         if (entry.path().extension() == ".json" && entry.path().filename().string()[0] != '_') {
             std::string relative = std::filesystem::relative(entry.path(), root).string();
-            if (filter.empty() || relative.find(filter) != std::string::npos)
-                files.push_back(entry.path().string());
+            if (filter.empty() || fits(relative, filter)) files.push_back(entry.path().string());
         }
     std::sort(files.begin(), files.end());
     return files;
 }
+
+namespace {
 
 bool applies(const Job& job, const Variant& variant, std::string& skip) {
     bool written_nv = std::any_of(job.sources.begin(), job.sources.end(), [](const StageSource& source) {
@@ -221,7 +230,7 @@ constexpr int kLost = 4;  // the child's exit status then
 
 int run_suite(const SuiteOptions& options) {
     std::vector<Task> tasks;
-    for (const std::string& file : find_cases(options.folder, options.filter))
+    for (const std::string& file : suite_files(options.folder, options.filter))
         for (const std::string& variant : options.variants) tasks.push_back({file, variant});
     if (options.shards > 1) {  // neighbours, which cost alike, go to different shards
         size_t kept = 0;
