@@ -87,6 +87,22 @@ class RtcRun(unittest.TestCase):
         self.assertEqual(code, 1, said)
         self.assertIn("0 passed, 2 failed", said)
 
+    def test_shards_and_the_time_limit_of_a_suite(self):
+        for i in range(3):
+            os.rename(self.case(5), os.path.join(self.folder.name, f"case{i}.json"))
+        ran = 0
+        for shard in range(4):  # more shards than cases
+            report = self.file("report.out", "")
+            code, said = run("--suite", self.folder.name, "--on", "rtc-nv", "--shard", f"{shard}/4", "--json", report)
+            self.assertEqual(code, 0, said)
+            with open(report) as file:
+                ran += len(json.load(file))
+        self.assertEqual(ran, 3)
+        self.fails("INDEX/COUNT", "--suite", self.folder.name, "--shard", "4/4")
+        code, said = run("--suite", self.folder.name, "--on", "rtc-nv", "--limit", "0.000001")
+        self.assertEqual(code, 0, said)
+        self.assertIn("3 skipped", said)
+
     def test_outputs(self):
         path = os.path.join(self.folder.name, "out.json")
         code, said = run("--case", self.case(5), "-o", "0.1=" + path)

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "core_test_util.h"
+#include "ir/module.h"
 #include "golden_case.h"
 
 namespace rtc::test {
@@ -358,6 +359,42 @@ TEST(Malformed, DecorationGroupsDoNotMultiply) {
             "OpReturn\nOpFunctionEnd\n";
     const LinkResult result = link_raygen(assemble(text));
     if (!result.ok) expect_clear_error(result, "4000 x 40 000 group decorations");
+}
+
+// Found by rtc_fuzz_reader: what a value's type is depended on the order of functions and types.
+TEST(Malformed, NothingStandsBehindAFunction) {
+    Words words = good_raygen();
+    words[3] += 1;
+    const Words late{3u << 16 | 22u, words[3] - 1, 64};  // OpTypeFloat 64
+    words.insert(words.end(), late.begin(), late.end());
+    const LinkResult result = link_raygen(words);
+    expect_clear_error(result, "a type behind the last function");
+    EXPECT_EQ(result.diagnostics.front().id, "spirv-malformed");
+}
+
+// Found by rtc_fuzz_reader: written and read again, instructions without a line took on the line before.
+TEST(Malformed, LinesEndWithTheirBlockAndWithNoLine) {
+    ir::Module module = ir::read_module(good_raygen(), "lines");
+    module.files.push_back("a.rgen");
+    ir::Block& first = module.functions[0].blocks[0];
+    ASSERT_GE(first.insts.size(), 3u);
+    for (ir::Inst& inst : first.insts) inst.source = {};
+    first.insts[0].source = {1, 7};
+    ir::Block second;
+    second.label = module.new_id();
+    second.insts.push_back(std::move(first.insts.back()));
+    first.insts.back() = ir::Inst(ir::Op::OpBranch, 0, 0, {second.label});
+    module.functions[0].blocks.insert(module.functions[0].blocks.begin() + 1, second);
+    const ir::Module again = ir::read_module(ir::write_module(module, true), "lines");
+    const std::vector<ir::Block>& blocks = again.functions[0].blocks;
+    EXPECT_EQ(blocks[0].insts[0].source.line, 7u);
+    EXPECT_EQ(blocks[0].insts[1].source.line, 0u) << "a line reached behind OpNoLine";
+    EXPECT_EQ(blocks[1].insts[0].source.line, 0u);
+    // A line that a block leaves open does not reach the next one.
+    module.functions[0].blocks[0].insts.back().source = {1, 9};
+    const ir::Module open = ir::read_module(ir::write_module(module, true), "lines");
+    EXPECT_EQ(open.functions[0].blocks[0].insts.back().source.line, 9u);
+    EXPECT_EQ(open.functions[0].blocks[1].insts[0].source.line, 0u) << "a line reached into the next block";
 }
 
 TEST(Malformed, PipelineDescriptions) {
