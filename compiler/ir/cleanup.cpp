@@ -82,12 +82,16 @@ class ConstantBools {
 void fold_constant_branches(const Program& program, Function& function) {
     ConstantBools bools(program);
     bool changed = false;
+    IdSet headers;  // of the loops so far: a branch to one of them is its back edge
     for (Block& block : function.blocks) {
         for (const Inst& inst : block.insts) bools.learn(inst);
+        if (const Inst* merge = block.merge(); merge && merge->op == Op::OpLoopMerge) headers.insert(block.label);
         Inst& end = block.terminator();
         if (end.op != Op::OpBranchConditional) continue;
         const int known = bools.value(end.ops[0]);
         if (known < 0) continue;
+        // A loop keeps its back edge, also where it is never taken: do { … } while (false).
+        if (headers.contains(end.ops[known ? 2 : 1])) continue;
         end.ops = {end.ops[known ? 1 : 2]};
         end.op = Op::OpBranch;
         if (block.merge() && block.merge()->op == Op::OpSelectionMerge)

@@ -117,7 +117,9 @@ class Branches {
   private:
     bool fold_branches() {
         bool changed = false;
+        std::set<Id> headers;  // of the loops so far: a branch to one of them is its back edge
         for (Block& block : f_.blocks) {
+            if (const Inst* merge = block.merge(); merge && merge->op == Op::OpLoopMerge) headers.insert(block.label);
             Inst& end = block.terminator();
             if (end.op != Op::OpBranchConditional) continue;
             const Inst* condition = p_.def(end.ops[0]);
@@ -125,6 +127,8 @@ class Branches {
             if (!same && (!condition || (condition->op != Op::OpConstantTrue && condition->op != Op::OpConstantFalse)))
                 continue;
             const Id target = same || condition->op == Op::OpConstantTrue ? end.ops[1] : end.ops[2];
+            // A loop keeps its back edge, also where it is never taken: do { … } while (false).
+            if (!same && headers.count(end.ops[1] == target ? end.ops[2] : end.ops[1])) continue;
             end = Inst(Op::OpBranch, 0, 0, {target});
             if (const size_t n = block.insts.size(); n > 1 && block.insts[n - 2].op == Op::OpSelectionMerge)
                 block.insts.erase(block.insts.end() - 2);

@@ -38,7 +38,9 @@ void main() {
 }
 """), "rmiss": nv(IN + "void main() { p = 1u; }\n", scene=False), "rchit": nv(IN + "void main() { p = 2u; }\n", scene=False),
     "rint": nv("void main() { r[gl_LaunchIDNV.x] = 1u; }\n", scene=False)},
-     [expect(f"boxes: {what} runs the intersection shader", i, [1]) for i, (_, _, _, what) in enumerate(lanes)],
+     [expect(f"boxes: {what} runs the intersection shader", i, [1],
+             native="lavapipe 25 drops a box that is entered exactly at tmax; VT: both ends are closed" if i == 1 else None)
+      for i, (_, _, _, what) in enumerate(lanes)],
      section="semantics 2.4 Candidates", size=(len(lanes), 1, 1), groups=[{"name": "hit", "closest": "rchit", "intersection": "rint"}],
      scene={"meshes": [{"name": "b", "boxes": [box(0, 0, 1, 3)]}]}, bindings={"0.2": {"f32": [v for l in lanes for v in (*l[:3], 0)]}})
 
@@ -100,3 +102,17 @@ make("rint", "box", "after a report out of range", before="    reportIntersectio
 make("rcall", "triangle", "after a nested callable", helper="layout(location = 3) callableDataNV uint called;\n",
      before="    called = 1u;\n    executeCallableNV(1, 3);\n",
      extra={"rcall:tool": "layout(location = 0) callableDataInNV uint called;\nvoid main() { called += 5u; }\n"})
+
+# Loops whose condition is a constant: their back edge is never taken, and must be there all the same.
+ONCE = "do { s = s * 3u + 1u; } while (false); uint i = 0u; do { ++i; do { s += i; TRACE_HERE } while (i < 9u && false); } while (i < 3u && false);\n"
+TRACED = f"p = s; traceNV(scene, 0, 0xff, 0, 0, 0, {RAY}, 0); s += p;"
+for stage in ("rgen", "rchit"):
+    traces = stage == "rgen"
+    body = "uint s = 5u; " + ONCE.replace("TRACE_HERE", TRACED if traces else "")
+    case(f"control-flow/{stage}-constant-conditions", {
+        "rgen": nv(P + ("void main() { " + body + "r[0] = s; }\n" if traces else
+                        f"void main() {{ p = 0u; traceNV(scene, 0, 0xff, 0, 0, 0, {RAY}, 0); r[0] = p; }}\n")),
+        "rchit": nv(IN + "void main() { " + ("p += 100u;" if traces else body + "p = s;") + " }\n", scene=False),
+        "rmiss": nv(IN + "void main() { p = 9u; }\n", scene=False)},
+         [expect(f"do-while loops that run once, in {'raygen around a trace' if traces else 'closest-hit'}", 0, [17 + 117 if traces else 17])],
+         section="design 2 States", scene=ONE_TRIANGLE)
