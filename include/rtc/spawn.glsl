@@ -25,8 +25,8 @@
 // In world space:
 //   o = M p + T, T added last       8u |M| |p| + 2u |T|
 //   o + offset n                    2u |o|
-// Measured: no self-hit for triangles of aspect down to 1e-5, see docs/accuracy.md. (The normal of a
-// thinner sliver is not known to floats.) The tier `fast` has no such bound on its t.
+// Derived, not yet measured. (The normal of a very thin sliver is not known to floats.) The tier `fast` has
+// no such bound on its t.
 #ifndef RTC_SPAWN_GLSL_
 #define RTC_SPAWN_GLSL_
 
