@@ -15,6 +15,11 @@ class Error : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
+// The device lacks a feature that a module needs; the text names it.
+class MissingFeature : public Error {
+    using Error::Error;
+};
+
 // Throws an Error naming the call and the result unless the result is VK_SUCCESS.
 void check(VkResult result, const char* call);
 const char* result_name(VkResult result);

@@ -163,6 +163,9 @@ Outcome run_one(const Task& task, const SuiteOptions& options, const std::functi
             outcome.kind = Outcome::Kind::Failed;
             outcome.detail = "validation: " + messages[said];
         }
+    } catch (const tools::MissingFeature& e) {
+        outcome.kind = Outcome::Kind::Skipped;
+        outcome.detail = e.what();
     } catch (const std::exception& e) {
         outcome.kind = Outcome::Kind::Failed;
         outcome.detail = e.what();
