@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "bench_device.h"
 #include "bench_scenes.h"
 #include "commands.h"
 #include "error.h"
@@ -33,12 +34,6 @@ struct Options {
 };
 
 double cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
-
-double median(std::vector<double> values) {
-    std::sort(values.begin(), values.end());
-    const size_t n = values.size();
-    return n == 0 ? 0 : n % 2 ? values[n / 2] : (values[n / 2 - 1] + values[n / 2]) / 2;
-}
 
 // One column: which switches are on.
 struct Switches {
@@ -157,7 +152,7 @@ class Bench {
         for (const Running& one : running) {
             std::vector<double> ratios;
             for (size_t i = 0; i < one.times.size(); ++i) ratios.push_back(running.front().times[i] / one.times[i]);
-            cells[one.column].gain = median(ratios);
+            cells[one.column].gain = median_of(ratios);
         }
         rows_.push_back({name, std::move(cells)});
     }
@@ -188,7 +183,7 @@ class Bench {
                 }
                 out << text;
             }
-            std::snprintf(text, sizeof text, " %u | %.2f |\n", instructions, median(compile));
+            std::snprintf(text, sizeof text, " %u | %.2f |\n", instructions, median_of(compile));
             out << (instructions ? text : " – | – |\n");
         }
         return out.str();

@@ -502,6 +502,17 @@ TEST_P(BuildTest, Instances) {
     }
 }
 
+// Rays start inside the only active instance, wherever it stands in the list.
+TEST_P(BuildTest, TheOnlyActiveInstanceIsNamed) {
+    Scene scene(*vk, rtr, 1 << 20);
+    auto a = scene.build_bottom({scene.triangles(soup(5, 1))}, flags());
+    const auto none = scene.instance(nullptr), some = scene.instance(a);
+    EXPECT_EQ(scene.words(scene.build_top({none, none, some, none}, flags()))[RTC_HDR_SINGLE_INSTANCE], 3u);
+    EXPECT_EQ(scene.words(scene.build_top({some, none, some}, flags()))[RTC_HDR_SINGLE_INSTANCE], 0u);
+    EXPECT_EQ(scene.words(scene.build_top({none, none}, flags()))[RTC_HDR_SINGLE_INSTANCE], 0u);
+    EXPECT_EQ(scene.words(a)[RTC_HDR_SINGLE_INSTANCE], 0u);
+}
+
 TEST_P(BuildTest, TopLevelFacts) {
     Scene scene(*vk, rtr, 1 << 20);
     auto opaque =
