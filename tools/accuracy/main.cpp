@@ -1,4 +1,5 @@
 // rtc-accuracy: what a tier leaks, how exact it is, what it costs.
+#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -6,6 +7,7 @@
 
 #include "command_line.h"
 #include "cases.h"
+#include "commands.h"
 #include "error.h"
 #include "experiments.h"
 
@@ -13,13 +15,6 @@ namespace {
 
 using namespace rtc::lab;
 using rtc::tools::Error;
-
-// 95 % bound on a rate of which `events` were seen in `n`: the rule of three
-// when none was, else about two standard deviations up.
-double upper_bound(uint64_t events, uint64_t n) {
-    if (events == 0) return 3.0 / double(n);
-    return (double(events) + 2 * std::sqrt(double(events)) + 2) / double(n);
-}
 
 std::string markdown(const Report& report, const std::string& device) {
     std::ostringstream out;
@@ -159,12 +154,6 @@ nlohmann::ordered_json to_json(const Report& report) {
     return json;
 }
 
-void write_file(const std::string& path, const std::string& text) {
-    std::ofstream file(path, std::ios::binary);
-    file << text;
-    if (!file.flush()) throw Error("cannot write " + path);
-}
-
 // What decides the exit code. The watertight tier must be clean where it
 // promises to be; the negative control must not be.
 bool verdict(const Report& report) {
@@ -197,7 +186,8 @@ bool verdict(const Report& report) {
 }
 
 int run(int argc, char** argv) {
-    CLI::App app{"Measures leaks, exactness and cost of rtc's traversal on a device."};
+    CLI::App app{"Measures leaks, exactness and cost of rtc's traversal on a device.\n"
+                 "rtc-accuracy leaks --help: campaigns whose rays the device makes."};
     std::vector<std::string> tiers = {"watertight"}, axes = {"mesh"};
     std::string device, json_path, markdown_path;
     uint64_t rays = 1 << 17, exact_rays = 0, cost_rays = 0, cull_rays = 0, agreement_rays = 0;
@@ -285,6 +275,20 @@ int run(int argc, char** argv) {
 
 }  // namespace
 
+double rtc::lab::upper_bound(uint64_t events, uint64_t n) {
+    if (events == 0) return 3.0 / double(n);
+    return (double(events) + 2 * std::sqrt(double(events)) + 2) / double(n);
+}
+
+void rtc::lab::write_file(const std::string& path, const std::string& text) {
+    std::ofstream file(path, std::ios::binary);
+    file << text;
+    if (!file.flush()) throw Error("cannot write " + path);
+}
+
 int main(int argc, char** argv) {
-    return rtc::tools::run_program("rtc-accuracy", [&] { return run(argc, argv); });
+    return rtc::tools::run_program("rtc-accuracy", [&] {
+        if (argc > 1 && std::string(argv[1]) == "leaks") return leaks_command(argc - 1, argv + 1);
+        return run(argc, argv);
+    });
 }

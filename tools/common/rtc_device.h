@@ -67,6 +67,8 @@ class RtcLauncher {
 
     // Records one launch; `push_constants` replaces the job's. At most max_launches() between two checks.
     void record(VkCommandBuffer commands, const std::vector<uint8_t>& push_constants);
+    // Later launches see this scene instead. No recorded launch may be pending.
+    void use_scene(const RtcScene& scene);
     // After the commands have completed: throws an Error for the first launch that failed, and frees what
     // the recorded launches held.
     void finish();
@@ -77,7 +79,9 @@ class RtcLauncher {
   private:
     static constexpr uint32_t kLaunches = 64;
     void make_table(const JobTable& table);
-    void make_recorder(const RtcScene& scene);
+    void make_recorder();
+    void write_structure(const RtcScene& scene, VkDescriptorSet set, uint32_t binding, uint32_t element) const;
+    void write_reserved() const;
 
     const RtcDevice& device_;
     RtrPipeline pipeline_ = nullptr;
@@ -85,6 +89,11 @@ class RtcLauncher {
     Buffer table_, control_, scratch_;
     RtrSbtLayout table_layout_{};
     VkDeviceSize raygen_offset_ = 0;
+    struct StructurePlace {
+        VkDescriptorSet set;
+        uint32_t binding, element;
+    };
+    std::vector<StructurePlace> structures_;
     std::unique_ptr<JobDescriptors> descriptors_;
     VkExtent3D extent_{};
     VkCommandBuffer recording_ = VK_NULL_HANDLE;

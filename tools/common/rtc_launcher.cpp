@@ -46,16 +46,8 @@ RtcLauncher::RtcLauncher(const RtcDevice& device, const RtcScene& scene, const R
     descriptors_ = std::make_unique<JobDescriptors>(
         device.context, job.bindings, VK_SHADER_STAGE_COMPUTE_BIT, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
         [&](VkDescriptorSet set, uint32_t binding, uint32_t element) {
-            const VkDescriptorBufferInfo structure = scene.descriptor();
-            VkWriteDescriptorSet write{};
-            write.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
-            write.dstSet = set;
-            write.dstBinding = binding;
-            write.dstArrayElement = element;
-            write.descriptorCount = 1;
-            write.descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
-            write.pBufferInfo = &structure;
-            vkUpdateDescriptorSets(device.context.device, 1, &write, 0, nullptr);
+            structures_.push_back({set, binding, element});
+            write_structure(scene, set, binding, element);
         },
         bindings_inside(device, job, module));
     const auto start = std::chrono::steady_clock::now();
@@ -72,7 +64,8 @@ RtcLauncher::RtcLauncher(const RtcDevice& device, const RtcScene& scene, const R
                  "rtrCreateRayTracingPipeline");
     create_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     make_table(job.table);
-    make_recorder(scene);
+    heap_ = scene.heap;
+    make_recorder();
 }
 
 RtcLauncher::~RtcLauncher() {
@@ -92,7 +85,7 @@ void RtcLauncher::make_table(const JobTable& table) {
     raygen_offset_ = table_layout_.raygen.offset + table.raygen_index * table_layout_.raygen.stride;
 }
 
-void RtcLauncher::make_recorder(const RtcScene& scene) {
+void RtcLauncher::make_recorder() {
     VkDeviceSize minimum = 0;
     const VkDeviceSize full = rtrGetLaunchScratchSize(device_.handle, pipeline_, extent_.width,
                                                       extent_.height, extent_.depth, &minimum);
@@ -111,7 +104,24 @@ void RtcLauncher::make_recorder(const RtcScene& scene) {
     recorderInfo.controlBuffer = control_.handle;
     recorderInfo.controlSize = control_size;
     device_.check(rtrCreateRecorder(device_.handle, &recorderInfo, nullptr, &recorder_), "rtrCreateRecorder");
-    heap_ = scene.heap;
+    write_reserved();
+}
+
+void RtcLauncher::write_structure(const RtcScene& scene, VkDescriptorSet set, uint32_t binding,
+                                  uint32_t element) const {
+    const VkDescriptorBufferInfo structure = scene.descriptor();
+    VkWriteDescriptorSet write{};
+    write.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
+    write.dstSet = set;
+    write.dstBinding = binding;
+    write.dstArrayElement = element;
+    write.descriptorCount = 1;
+    write.descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+    write.pBufferInfo = &structure;
+    vkUpdateDescriptorSets(device_.context.device, 1, &write, 0, nullptr);
+}
+
+void RtcLauncher::write_reserved() const {
     if (!info().reservedInAppSet) return;
     RtrReservedDescriptors reserved{};
     reserved.heap = heap_;
@@ -122,6 +132,13 @@ void RtcLauncher::make_recorder(const RtcScene& scene) {
     device_.check(rtrWriteReservedDescriptors(device_.handle, pipeline_, descriptors_->sets.at(info().reservedSet),
                                               &reserved),
                   "rtrWriteReservedDescriptors");
+}
+
+void RtcLauncher::use_scene(const RtcScene& scene) {
+    heap_ = scene.heap;
+    for (const StructurePlace& place : structures_)
+        write_structure(scene, place.set, place.binding, place.element);
+    write_reserved();
 }
 
 void RtcLauncher::record(VkCommandBuffer commands, const std::vector<uint8_t>& push_constants) {

@@ -24,23 +24,19 @@ constexpr uint32_t kExact[] = {
 constexpr uint32_t kExact64[] = {
 #include "lab_exact64.inc"
 };
-constexpr uint32_t kContracted[] = {
-#include "lab_contracted.inc"
-};
-
 constexpr uint32_t kProbe[] = {
 #include "lab_probe.inc"
 };
 
 std::vector<uint32_t> module_words(Variant variant) {
     std::vector<uint32_t> words;
-    if (variant == Variant::Watertight) words.assign(std::begin(kWatertight), std::end(kWatertight));
+    if (variant == Variant::Watertight || variant == Variant::Contracted)
+        words.assign(std::begin(kWatertight), std::end(kWatertight));
     if (variant == Variant::Fast) words.assign(std::begin(kFast), std::end(kFast));
     if (variant == Variant::Exact) words.assign(std::begin(kExact), std::end(kExact));
     if (variant == Variant::Exact64) words.assign(std::begin(kExact64), std::end(kExact64));
     if (variant == Variant::Probe) words.assign(std::begin(kProbe), std::end(kProbe));
     if (variant == Variant::Contracted) {
-        words.assign(std::begin(kContracted), std::end(kContracted));
         contract(words);
     } else {
         decorate_no_contraction(words);

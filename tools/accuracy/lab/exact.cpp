@@ -37,8 +37,9 @@ double triple(const D3& d, const D3& a, const D3& b, double& error) {
     return d.x * (px - qx) + d.y * (py - qy) + d.z * (pz - qz);
 }
 
-// Certainly missed?
-bool filtered_out(const ExactRay& ray, const Triangle& v) {
+}  // namespace
+
+bool surely_missed(const ExactRay& ray, const Triangle& v) {
     const D3 d = {ray.direction.x, ray.direction.y, ray.direction.z};
     const D3 a = sub(v[0], ray.origin), b = sub(v[1], ray.origin), c = sub(v[2], ray.origin);
     double e[3];
@@ -50,8 +51,6 @@ bool filtered_out(const ExactRay& ray, const Triangle& v) {
     }
     return positive && negative;
 }
-
-}  // namespace
 
 Verdict intersect(const ExactRay& ray, const Triangle& v, mpq_class* t) {
     std::array<ExactPoint, 3> corners;
@@ -85,7 +84,7 @@ std::optional<ExactHit> nearest(const ExactRay& ray, const std::vector<Triangle>
     const bool bounded = std::isfinite(ray.tmax);
     const mpq_class tmax = bounded ? q(ray.tmax) : mpq_class(0);
     for (uint32_t i = 0; i < triangles.size(); ++i) {
-        if (filtered_out(ray, triangles[i])) continue;
+        if (surely_missed(ray, triangles[i])) continue;
         mpq_class t;
         const Verdict verdict = intersect(ray, triangles[i], &t);
         if (verdict == Verdict::Miss || t <= tmin || (bounded && t >= tmax)) continue;

@@ -41,6 +41,9 @@ struct ExactHit {
 // can with its error bound; the rest is decided in rationals.
 std::optional<ExactHit> nearest(const ExactRay& ray, const std::vector<Triangle>& triangles);
 
+// A filter in double: true only where the ray's line misses the triangle's inside and edges.
+bool surely_missed(const ExactRay& ray, const Triangle& triangle);
+
 // Smallest barycentric weight of the ray's point in the triangle's plane, in
 // double: how far inside (or outside: negative) it passes.
 double inside_margin(const ExactRay& ray, const Triangle& triangle);

@@ -39,10 +39,6 @@ const uint LAB_PAUSE = 32u; // a suspended lane ends, and a later dispatch goes 
 
 const uint LAB_PENDING = 0x80000000u; // in `suspensions`
 
-#ifdef LAB_FUSED
-float lab_fused(const float a, const float b, const float c) { return float(double(a) * double(b) + double(c)); }
-#endif
-
 void lab_check_object_ray(inout uint mismatches) {
     vec3 o = rtc_object_ray_origin(rtc_ray_root, rtc_cand_instance, rtc_ray_origin);
     vec3 d = rtc_object_ray_direction(rtc_ray_root, rtc_cand_instance, rtc_ray_direction);
@@ -161,11 +157,6 @@ void main() {
         result.suspensions = suspensions;
         result.mismatches = mismatches;
         result.last_opaque = rtc_cand_opaque;
-#ifdef LAB_FUSED
-        if (rtc_launch_size.y == 77u) {
-            result.t = lab_fused(result.t, result.t, result.t);
-        }
-#endif
         if (!asleep) {
             lab_results[rtc_launch_id.x] = result;
         }

@@ -24,6 +24,8 @@ IndexedMesh make_torus_knot(uint32_t along, uint32_t around);
 IndexedMesh make_slivers(uint32_t count, double ratio);
 // A cube whose faces are n x n grids: rays along the axes meet its edges and vertices exactly.
 IndexedMesh make_cube_grid(uint32_t n);
+// A mug with a handle: a subdivided cage, as modellers make them.
+IndexedMesh make_mug(uint32_t subdivisions);
 // Flat, in the plane z = 0: the thinnest boxes there are. Open.
 IndexedMesh make_plane(uint32_t n);
 

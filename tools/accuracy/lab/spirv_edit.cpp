@@ -1,19 +1,17 @@
 #include "spirv_edit.h"
 
-#include <cstring>
-#include <string_view>
+#include <cstddef>
+#include <tuple>
 #include <unordered_map>
-
-#include "error.h"
 
 namespace rtc::lab {
 namespace {
 
 enum : uint32_t {
-    OpName = 5,
+    OpCapability = 17,
     OpTypeFloat = 22,
-    OpFunctionCall = 57,
     OpDecorate = 71,
+    OpFConvert = 115,
     OpFNegate = 127,
     OpFAdd = 129,
     OpFSub = 131,
@@ -22,6 +20,7 @@ enum : uint32_t {
     OpFRem = 140,
     OpVectorTimesScalar = 142,
     OpDot = 148,
+    CapabilityFloat64 = 10,
     DecorationNoContraction = 42,
 };
 
@@ -48,44 +47,56 @@ void decorate_no_contraction(std::vector<uint32_t>& spirv) {
 }
 
 void contract(std::vector<uint32_t>& spirv) {
-    uint32_t float_type = 0, fused = 0;
+    uint32_t float_type = 0, double_type = 0;
+    bool capable = false;
     std::unordered_map<uint32_t, std::pair<uint32_t, uint32_t>> products;
     each_instruction(spirv, [&](uint32_t op, size_t at, size_t) {
-        if (op == OpName) {
-            const std::string_view name(reinterpret_cast<const char*>(&spirv[at + 2]));
-            if (name.starts_with("lab_fused(")) fused = spirv[at + 1];
-        } else if (op == OpTypeFloat && spirv[at + 2] == 32) {
-            float_type = spirv[at + 1];
+        if (op == OpCapability) {
+            capable = capable || spirv[at + 1] == CapabilityFloat64;
+        } else if (op == OpTypeFloat) {
+            if (spirv[at + 2] == 32) float_type = spirv[at + 1];
+            if (spirv[at + 2] == 64) double_type = spirv[at + 1];
         } else if (op == OpFMul && spirv[at + 1] == float_type) {
             products[spirv[at + 2]] = {spirv[at + 3], spirv[at + 4]};
         }
     });
-    if (!fused) throw tools::Error("the negative control lacks lab_fused");
     std::vector<uint32_t> out(spirv.begin(), spirv.begin() + 5);
+    if (!capable) out.insert(out.end(), {2u << 16 | OpCapability, CapabilityFloat64});
+    const bool declare = double_type == 0;
+    if (declare) double_type = out[3]++;
+    auto emit = [&](uint32_t op, uint32_t type, uint32_t a, uint32_t b = 0) {
+        const uint32_t result = out[3]++;
+        out.insert(out.end(), {(b ? 5u : 4u) << 16 | op, type, result, a});
+        if (b) out.push_back(b);
+        return result;
+    };
     each_instruction(spirv, [&](uint32_t op, size_t at, size_t count) {
         const bool sum = (op == OpFAdd || op == OpFSub) && spirv[at + 1] == float_type;
         const auto left = sum ? products.find(spirv[at + 3]) : products.end();
         const auto right = sum ? products.find(spirv[at + 4]) : products.end();
+        // What is no arithmetic any more must not be decorated as such.
+        if (op == OpDecorate && spirv[at + 2] == DecorationNoContraction) return;
         if (left == products.end() && right == products.end()) {
             out.insert(out.end(), spirv.begin() + at, spirv.begin() + at + count);
+            if (declare && op == OpTypeFloat) out.insert(out.end(), {3u << 16 | OpTypeFloat, double_type, 64});
             return;
         }
-        auto negate = [&](uint32_t id) {
-            const uint32_t result = out[3]++;
-            out.insert(out.end(), {4u << 16 | OpFNegate, float_type, result, id});
-            return result;
-        };
         uint32_t a, b, c;
+        bool negate_product = false;
         if (left != products.end()) {
-            a = left->second.first;
-            b = left->second.second;
-            c = op == OpFSub ? negate(spirv[at + 4]) : spirv[at + 4];
+            std::tie(a, b) = left->second;
+            c = spirv[at + 4];
         } else {
-            a = op == OpFSub ? negate(right->second.first) : right->second.first;
-            b = right->second.second;
+            std::tie(a, b) = right->second;
             c = spirv[at + 3];
+            negate_product = op == OpFSub;
         }
-        out.insert(out.end(), {7u << 16 | OpFunctionCall, float_type, spirv[at + 2], fused, a, b, c});
+        const uint32_t product = emit(OpFMul, double_type, emit(OpFConvert, double_type, a),
+                                      emit(OpFConvert, double_type, b));
+        const uint32_t third = emit(OpFConvert, double_type, c);
+        const uint32_t total = negate_product ? emit(OpFSub, double_type, third, product)
+                                              : emit(op, double_type, product, third);
+        out.insert(out.end(), {4u << 16 | OpFConvert, float_type, spirv[at + 2], total});
     });
     spirv = std::move(out);
 }

@@ -10,8 +10,8 @@ namespace rtc::lab {
 // NoContraction on every float operation.
 void decorate_no_contraction(std::vector<uint32_t>& spirv);
 
-// Every a * b + c of scalar floats becomes one rounding: lab_fused(a, b, c),
-// which the module must define. The negative control.
+// Every a * b + c of scalar floats gets one rounding, by way of doubles: the module needs Float64 then.
+// The negative control.
 void contract(std::vector<uint32_t>& spirv);
 
 }  // namespace rtc::lab

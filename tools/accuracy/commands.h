@@ -1,0 +1,17 @@
+// rtc-accuracy's commands, and what their reports share.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace rtc::lab {
+
+// argv[0] is the command's own name. Exit status; throws tools::Error.
+int leaks_command(int argc, char** argv);
+
+// 95 % bound on a rate of which `events` were seen in `n`: the rule of three when none was, else about two
+// standard deviations up.
+double upper_bound(uint64_t events, uint64_t n);
+void write_file(const std::string& path, const std::string& text);  // throws tools::Error
+
+}  // namespace rtc::lab

@@ -1,0 +1,5 @@
+#version 460
+#extension GL_EXT_ray_tracing : require
+layout(location = 0) rayPayloadInEXT uvec2 seen;
+
+void main() {}
