@@ -32,8 +32,12 @@ const uint kNoHit = 0xffffffffu;
 const float kRayMax = 1e30;
 
 vec3 camera_direction(uvec2 pixel, uvec2 size, vec2 jitter) {
-    vec2 ndc = (vec2(pixel) + jitter) / vec2(size) * 2.0 - 1.0;
-    return normalize(frame.forward.xyz + ndc.x * frame.right.xyz - ndc.y * frame.up.xyz);
+    // Contracted nowhere, so that every driver makes the same rays.
+    precise vec2 ndc = (vec2(pixel) + jitter) / vec2(size) * 2.0 - 1.0;
+    precise vec3 d = frame.forward.xyz + ndc.x * frame.right.xyz - ndc.y * frame.up.xyz;
+    precise float squared = d.x * d.x + d.y * d.y + d.z * d.z;
+    precise vec3 unit = d * inversesqrt(squared);
+    return unit;
 }
 
 vec3 sky(vec3 direction) { return mix(frame.sky_low.rgb, frame.sky_high.rgb, max(direction.y, 0.0)); }

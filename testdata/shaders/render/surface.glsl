@@ -33,8 +33,35 @@ struct Surface {
 // intersection test subtracts the origin from the vertices and adds as much again, of the triangle's
 // extent. 32 u is three times their sum; nearby geometry is displaced by 2e-6 of its coordinates.
 float spawn_offset(vec3 p0, vec3 p1, vec3 p2, vec3 position, vec3 translation) {
-    vec3 magnitude = max(max(abs(p0), abs(p1)), abs(p2)) + abs(position) + abs(translation);
-    return (32.0 / 16777216.0) * (magnitude.x + magnitude.y + magnitude.z);
+    precise vec3 magnitude = max(max(abs(p0), abs(p1)), abs(p2)) + abs(position) + abs(translation);
+    precise float sum = magnitude.x + magnitude.y + magnitude.z;
+    return (32.0 / 16777216.0) * sum;
+}
+
+// Arithmetic that every driver does alike, contracted nowhere: `precise` does not reach into dot, cross, normalize
+// and reflect, so they are written out for what new rays are made of.
+float exact_dot(vec3 a, vec3 b) {
+    precise float sum = a.x * b.x + a.y * b.y + a.z * b.z;
+    return sum;
+}
+
+vec3 exact_cross(vec3 a, vec3 b) {
+    precise vec3 product;
+    product.x = a.y * b.z - a.z * b.y;
+    product.y = a.z * b.x - a.x * b.z;
+    product.z = a.x * b.y - a.y * b.x;
+    return product;
+}
+
+vec3 exact_normalize(vec3 a) {
+    precise vec3 unit = a * inversesqrt(exact_dot(a, a));
+    return unit;
+}
+
+vec3 exact_reflect(vec3 d, vec3 n) {
+    precise float twice = 2.0 * exact_dot(d, n);
+    precise vec3 mirrored = d - n * twice;
+    return mirrored;
 }
 
 vec3 to_world(vec4 row0, vec4 row1, vec4 row2, vec3 p) {
@@ -51,17 +78,10 @@ vec3 to_world(vec4 row0, vec4 row1, vec4 row2, vec3 p) {
 // of one bit; taken from the ray in arithmetic that all must do alike, paths stay together. Edge-on, where
 // these are the worse ones, the given ones stay.
 vec2 crossing(vec3 p0, vec3 p1, vec3 p2, vec3 origin, vec3 d, vec2 given) {
-    precise vec3 e = p1 - p0, f = p2 - p0, s = origin - p0, p, q;
-    p.x = d.y * f.z - d.z * f.y;
-    p.y = d.z * f.x - d.x * f.z;
-    p.z = d.x * f.y - d.y * f.x;
-    q.x = s.y * e.z - s.z * e.y;
-    q.y = s.z * e.x - s.x * e.z;
-    q.z = s.x * e.y - s.y * e.x;
-    precise float determinant = e.x * p.x + e.y * p.y + e.z * p.z;
-    precise vec2 weights;
-    weights.x = (s.x * p.x + s.y * p.y + s.z * p.z) / determinant;
-    weights.y = (d.x * q.x + d.y * q.y + d.z * q.z) / determinant;
+    precise vec3 e = p1 - p0, f = p2 - p0, s = origin - p0;
+    vec3 p = exact_cross(d, f), q = exact_cross(s, e);
+    float determinant = exact_dot(e, p);
+    precise vec2 weights = vec2(exact_dot(s, p), exact_dot(d, q)) / determinant;
     // NaN is no less.
     return all(lessThan(abs(weights - given), vec2(1e-3))) ? weights : given;
 }
@@ -90,17 +110,18 @@ Surface fetch_surface(uvec4 hit, vec3 origin, vec3 direction) {
     Surface surface;
     surface.position = position;
     surface.spawn_offset = spawn_offset(p0, p1, p2, position, vec3(row0.w, row1.w, row2.w));
-    surface.ng = normalize(cross(p1 - p0, p2 - p0));
-    bool front = dot(surface.ng, direction) < 0.0;
+    surface.ng = exact_normalize(exact_cross(p1 - p0, p2 - p0));
+    bool front = exact_dot(surface.ng, direction) < 0.0;
     surface.ng = front ? surface.ng : -surface.ng;
     surface.ns = surface.ng;
     if (mesh.y != 0.0) {
-        vec3 n = nv0.xyz * w + nv1.xyz * u + nv2.xyz * v;
-        n = normalize(vec3(dot(texelFetch(instances, entry + 3).xyz, n), dot(texelFetch(instances, entry + 4).xyz, n),
-                           dot(texelFetch(instances, entry + 5).xyz, n)));
-        n = dot(n, surface.ng) < 0.0 ? -n : n;
+        precise vec3 mixed = nv0.xyz * w + nv1.xyz * u + nv2.xyz * v;
+        vec3 n = exact_normalize(vec3(exact_dot(texelFetch(instances, entry + 3).xyz, mixed),
+                                      exact_dot(texelFetch(instances, entry + 4).xyz, mixed),
+                                      exact_dot(texelFetch(instances, entry + 5).xyz, mixed)));
+        n = exact_dot(n, surface.ng) < 0.0 ? -n : n;
         // A shading normal that faces away from the viewer would shade the wrong side.
-        surface.ns = dot(n, direction) < 0.0 ? n : surface.ng;
+        surface.ns = exact_dot(n, direction) < 0.0 ? n : surface.ng;
     }
     surface.base_color = color_metallic.rgb;
     surface.metallic = color_metallic.a;
@@ -116,8 +137,9 @@ Surface fetch_surface(uvec4 hit, vec3 origin, vec3 direction) {
 
 // Where a ray towards `direction` starts: off the surface, on the side it leaves to.
 vec3 spawn_point(Surface surface, vec3 direction) {
-    float side = dot(direction, surface.ng) < 0.0 ? -1.0 : 1.0;
-    return surface.position + surface.ng * (side * surface.spawn_offset);
+    float side = exact_dot(direction, surface.ng) < 0.0 ? -1.0 : 1.0;
+    precise vec3 start = surface.position + surface.ng * (side * surface.spawn_offset);
+    return start;
 }
 
 float luminance(vec3 color) { return dot(color, vec3(0.2126, 0.7152, 0.0722)); }

@@ -41,9 +41,9 @@ void main() {
 
     vec3 share = fresnel(ggx_f0(surface), -dot(surface.ns, direction));
     if (incoming.depth < kMaxReflections && max(share.r, max(share.g, share.b)) > 0.01) {
-        vec3 mirrored = reflect(direction, surface.ns);
+        vec3 mirrored = exact_reflect(direction, surface.ns);
         // Smooth normals can mirror a ray into the triangle; keep it outside.
-        if (dot(mirrored, surface.ng) <= 0.0) mirrored = reflect(direction, surface.ng);
+        if (exact_dot(mirrored, surface.ng) <= 0.0) mirrored = exact_reflect(direction, surface.ng);
         reflected.color = vec3(0.0);
         reflected.depth = incoming.depth + 1u;
         reflected.rng = incoming.rng;
