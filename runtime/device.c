@@ -134,6 +134,10 @@ VkResult rtrCreateDevice(const RtrDeviceCreateInfo* info, const VkAllocationCall
     d->vki.GetPhysicalDeviceProperties2(d->physical_device, &properties);
     d->limits = properties.properties.limits;
     rtr_make_blob_version(&id, d->blob_version);
+    if ((r = rtr_learn_features(d, info->pDeviceCreateInfo)) != VK_SUCCESS) {
+        rtr_error(d, r, "features", "the features and extensions of the device could not be queried");
+        goto fail;
+    }
     r = create_layouts(d, allocator);
     if (r == VK_SUCCESS) r = create_kernels(d, info->pipelineCache, allocator);
     if (r != VK_SUCCESS) goto fail;

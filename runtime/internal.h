@@ -138,6 +138,12 @@ struct RtrDevice_T {
     VkPhysicalDeviceLimits limits;
     uint8_t blob_version[2 * VK_UUID_SIZE]; /* driver UUID, then ours, see serialize.c */
     RtrPhysicalDeviceSupport support;
+    /* What modules may need, see features.c: bits by the rows of its tables. */
+    uint32_t api_version;
+    uint64_t features, extensions;
+    VkSubgroupFeatureFlags subgroup_operations; /* in compute shaders */
+    bool spirv_1_4;
+    bool features_told; /* by the application; otherwise what the physical device offers */
 
     VkDescriptorSetLayout input_layout; /* set 0 of the kernels */
     VkDescriptorSetLayout array_layout; /* set 1 */
@@ -344,6 +350,11 @@ typedef struct RtrModule {
 } RtrModule;
 VkResult rtr_parse_module(RtrDevice device, const uint32_t* code, size_t size,
                           const VkAllocationCallbacks* allocator, RtrModule* module);
+/* Features and extensions (features.c): what the device was created with, or (NULL) what the
+ * physical device offers; then whether a parsed module can run with that, each thing missing
+ * reported by name. */
+VkResult rtr_learn_features(RtrDevice device, const VkDeviceCreateInfo* made);
+VkResult rtr_check_features(RtrDevice device, const uint32_t* code, size_t size);
 void rtr_free_module(const VkAllocationCallbacks* allocator, RtrModule* module);
 
 /* Layout bindings of the reserved set that `used` names, at `base`; returns their number. */

@@ -295,6 +295,7 @@ VkResult rtrCreateRayTracingPipeline(RtrDevice d, VkPipelineCache cache,
     if (p->push_size > RTR_MAX_PUSH_BYTES)
         r = rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "push-constants", "%u bytes of push constants",
                       p->push_size);
+    if (r == VK_SUCCESS) r = rtr_check_features(d, info->pCode, info->codeSize);
     if (r == VK_SUCCESS) r = pick_options(d, &module, info->pOptions, &p->options);
     if (r == VK_SUCCESS) r = check_limits(d, &module, &p->options, p->set_layout_count, p->push_size);
     if (r == VK_SUCCESS) r = create_layout(d, info, p, a);

@@ -154,6 +154,10 @@ typedef struct RtrDeviceCreateInfo {
      * launch error SBT_RANGE or BAD_HANDLE with the region and record; and where sizes are not
      * given (rtrCmdTraceRays), records outside the buffer act as null instead of being read. */
     VkBool32 validation;
+    /* What `device` was created with, read during this call: a pipeline whose module needs a
+     * feature or extension that is not in it is then refused by name. NULL: only what the
+     * physical device does not have is refused, and enabling the rest is up to you. */
+    const VkDeviceCreateInfo* pDeviceCreateInfo;
 } RtrDeviceCreateInfo;
 
 /* Prepares the runtime on a VkDevice: builds its kernels (some 30 small compute
@@ -537,8 +541,10 @@ typedef struct RtrRayTracingPipelineCreateInfo {
 
 /* Counterpart: vkCreateRayTracingPipelinesNV (one pipeline a call).
  * Checks the module's ABI version (VK_ERROR_INCOMPATIBLE_DRIVER), its limits by name
- * (descriptors of one stage: all ray tracing stages are one compute shader now), and
- * that its reflection is whole. */
+ * (descriptors of one stage: all ray tracing stages are one compute shader now), that its
+ * reflection is whole, and that the device has what it needs: VK_ERROR_FEATURE_NOT_PRESENT with
+ * a message for each missing feature ("shaderFloat64"), extension, subgroup operation or version
+ * of SPIR-V, before Vulkan sees the module. See RtrDeviceCreateInfo::pDeviceCreateInfo. */
 RTR_API VkResult rtrCreateRayTracingPipeline(RtrDevice device, VkPipelineCache pipelineCache,
                                              const RtrRayTracingPipelineCreateInfo* pCreateInfo,
                                              const VkAllocationCallbacks* pAllocator, RtrPipeline* pPipeline);
