@@ -188,6 +188,7 @@ void rtrDestroyAccelerationStructure(RtrDevice d, RtrAccelerationStructure as,
                                      const VkAllocationCallbacks* allocator) {
     const VkAllocationCallbacks* a = rtr_pick(d, allocator);
     if (!as) return;
+    rtr_remove_live(as);
     rtr_free(a, as->geometries);
     rtr_free(a, as);
 }
@@ -250,6 +251,7 @@ VkResult rtrBindAccelerationStructureMemory(RtrDevice d, uint32_t count,
         if (b->buffer) {
             r = bind_address(d, as, b->buffer, b->bufferOffset, i);
             if (r != VK_SUCCESS) return r;
+            rtr_add_live(as);
             continue;
         }
         if (b->heapOffset == 0 || b->heapOffset % RTC_AS_ALIGNMENT)
@@ -265,6 +267,7 @@ VkResult rtrBindAccelerationStructureMemory(RtrDevice d, uint32_t count,
         as->buffer = b->heap->buffer;
         as->offset = b->heap->offset + b->heapOffset;
         as->base = b->heapOffset / RTC_QUAD_BYTES;
+        rtr_add_live(as);
     }
     return VK_SUCCESS;
 }

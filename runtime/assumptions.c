@@ -64,6 +64,7 @@ uint32_t rtr_first_not_opaque(const VkAccelerationStructureInfoNV* info) {
 VkResult rtrCmdDeclareScene(RtrRecorder r, uint32_t count, const RtrAccelerationStructure* structures) {
     RtrDeclaredScene scene = {~0u, ~0u, ~0u, 0};
     uint32_t i, g;
+    VkResult result;
     if (!r->cmd) return rtr_not_begun(r, "rtrCmdDeclareScene");
     for (i = count; i-- > 0;) {
         const struct RtrAccelerationStructure_T* as = structures[i];
@@ -81,6 +82,11 @@ VkResult rtrCmdDeclareScene(RtrRecorder r, uint32_t count, const RtrAcceleration
         }
     }
     r->scene = scene;
+    rtr_forget_declared(r);
+    for (i = 0; r->device->validation && i < count; i++)
+        if (structures[i]->type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV &&
+            (result = rtr_add_checked(r, structures[i], i)) != VK_SUCCESS)
+            return result;
     return VK_SUCCESS;
 }
 

@@ -159,6 +159,8 @@ static VkResult record_build(RtrBuild* b) {
     VkResult r = rtr_bind_arrays(b, 0, 0);
     if (r != VK_SUCCESS) return r;
     rtr_dispatch(b, RTR_KERNEL_init, 1);
+    if ((b->push.flags & RTR_BUILD_TOP) && (r = rtr_check_build_instances(b, RTR_ARR_MARKS)) != VK_SUCCESS)
+        return r;
     if ((r = rtr_for_each_input(b, emit_leaves)) != VK_SUCCESS) return r;
     if (b->primitives) {
         rtr_dispatch(b, RTR_KERNEL_morton, groups);
@@ -253,6 +255,12 @@ static VkResult check_build(RtrBuild* b, const VkAccelerationStructureInfoNV* in
     return VK_SUCCESS;
 }
 
+/* Launches of this recording look at what it built. */
+static VkResult remember_top(const RtrBuild* b) {
+    if (!b->device->validation || !(b->push.flags & RTR_BUILD_TOP) || !b->recorder->control) return VK_SUCCESS;
+    return rtr_add_checked(b->recorder, b->dst, RTC_ERROR_BUILT);
+}
+
 VkResult rtrCmdBuildAccelerationStructure(RtrRecorder recorder, const VkAccelerationStructureInfoNV* info,
                                           VkBuffer instanceData, VkDeviceSize instanceOffset, VkBool32 update,
                                           RtrAccelerationStructure dst, RtrAccelerationStructure src,
@@ -292,8 +300,10 @@ VkResult rtrCmdBuildAccelerationStructure(RtrRecorder recorder, const VkAccelera
                    (dst->heap ? 0u : RTC_FACT_ADDRESSES);
     if (update) {
         rtr_update_scratch(dst->primitive_count, dst->geometry_count, &b.layout);
-        return rtr_record_update(&b, src);
+        r = rtr_record_update(&b, src);
+        return r == VK_SUCCESS ? remember_top(&b) : r;
     }
     rtr_build_scratch(dst->primitive_count, &b.layout);
-    return record_build(&b);
+    r = record_build(&b);
+    return r == VK_SUCCESS ? remember_top(&b) : r;
 }

@@ -64,6 +64,10 @@ VkResult rtr_bind_sets(RtrRecorder recorder, RtrHeap heap, const RtrBinding* bin
 void rtr_dispatch_kernel(RtrRecorder recorder, RtrKernel kernel, const struct RtrBuildPush* push,
                          uint32_t groups);
 
+/* With validation: fills MARKS with which instance references are good. The bytes of scratch
+ * from LEAF_BOX up to `end` are used meanwhile. */
+VkResult rtr_check_build_instances(RtrBuild* b, uint32_t end);
+
 VkResult rtr_record_update(RtrBuild* b, RtrAccelerationStructure src);
 
 #endif /* RTR_BUILD_H_ */

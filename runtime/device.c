@@ -119,6 +119,7 @@ VkResult rtrCreateDevice(const RtrDeviceCreateInfo* info, const VkAllocationCall
         goto fail;
     }
     d->validation = info->validation;
+    atomic_flag_clear(&d->live_lock);
     if (info->bufferDeviceAddress) {
         d->get_buffer_device_address =
             d->support.addressMode ? rtr_load_buffer_device_address(&d->vki, d->device) : NULL;

@@ -2,6 +2,7 @@
 #ifndef RTR_INTERNAL_H_
 #define RTR_INTERNAL_H_
 
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -99,11 +100,13 @@ RtrGetBufferDeviceAddress rtr_load_buffer_device_address(const RtrInstanceTable*
     X(prepare_launch)   \
     X(finish_launch)    \
     X(validate_launch)  \
+    X(check_instances)  \
     X(probe)                \
     RTR_ADDRESS_KERNELS(X)
 /* Variants that follow device addresses; created only with bufferDeviceAddress. */
 #define RTR_ADDRESS_KERNELS(X) \
     X(leaf_instances_address)  \
+    X(check_instances_address) \
     X(copy_address)            \
     X(serialize_address)       \
     X(deserialize_address)
@@ -150,6 +153,9 @@ struct RtrDevice_T {
     VkDescriptorSetLayout empty_layout;
     VkPipelineLayout kernel_layout;
     bool validation;
+    /* With validation: the bottom levels that are bound and not destroyed. */
+    atomic_flag live_lock;
+    struct RtrAccelerationStructure_T* live;
     RtrGetBufferDeviceAddress get_buffer_device_address; /* NULL: no address mode */
     VkPipeline kernels[RTR_KERNEL_COUNT];
 };
@@ -185,6 +191,7 @@ struct RtrAccelerationStructure_T {
     VkDeviceSize offset; /* in the buffer */
     RtrHeap heap;        /* NULL in address mode */
     uint64_t base;       /* the handle: quads from the heap's start, or a device address */
+    struct RtrAccelerationStructure_T *live_next, *live_before; /* in RtrDevice_T::live */
 };
 
 #define RTR_POOL_SETS 64u
@@ -221,6 +228,13 @@ typedef struct RtrDeclaredScene {
     uint32_t not_opaque_geometry;
 } RtrDeclaredScene;
 
+/* A top level of the declared scene (its index there), or one that this recording built
+ * (RTC_ERROR_BUILT). */
+typedef struct RtrCheckedTop {
+    RtrAccelerationStructure as;
+    uint32_t index;
+} RtrCheckedTop;
+
 struct RtrRecorder_T {
     RtrDevice device;
     VkAllocationCallbacks allocator;
@@ -241,6 +255,9 @@ struct RtrRecorder_T {
     uint32_t max_rounds;
     uint32_t stack_size; /* set by the application; 0: not set */
     RtrDeclaredScene scene;
+    /* With validation: top levels whose instances launches look at. */
+    struct RtrCheckedTop* checked;
+    uint32_t checked_count, checked_capacity;
     uint32_t set_call_count;
     RtrBoundSets set_calls[RTR_MAX_SET_CALLS];
     uint32_t push_size;
@@ -377,10 +394,22 @@ void rtr_make_blob_version(const VkPhysicalDeviceIDProperties* id, uint8_t versi
 typedef struct RtrLaunchCheck {
     const RtrStridedBufferRegion* regions;  /* 4: raygen, miss, hit, callable */
     VkDescriptorBufferInfo params, control; /* slots of parameters; the control block */
+    VkDeviceSize table; /* RTR_CHECK_BYTES of the control buffer; not there without checked top levels */
     uint32_t slots, slot_words;
     uint32_t identity;
 } RtrLaunchCheck;
 /* Records the checks; afterwards a launch with an error has no lanes. */
 VkResult rtr_validate_launch(RtrRecorder recorder, const RtrLaunchCheck* check);
+
+/* ---- References of instances, with validation (validate_instances.c) ------------------------ */
+#define RTR_CHECK_BYTES 16384u /* of the control region: a piece of the table of live bottom levels */
+void rtr_add_live(RtrAccelerationStructure bottom);
+void rtr_remove_live(RtrAccelerationStructure bottom);
+/* From now on launches of this recorder look at the top level. */
+VkResult rtr_add_checked(RtrRecorder recorder, RtrAccelerationStructure top, uint32_t index);
+/* Forgets those of the declared scene. */
+void rtr_forget_declared(RtrRecorder recorder);
+/* Records the checks of what the launch reaches. */
+VkResult rtr_check_launch_instances(RtrRecorder recorder, const RtrLaunchCheck* check);
 
 #endif /* RTR_INTERNAL_H_ */

@@ -59,6 +59,17 @@ void rtrFormatLaunchError(const RtrLaunchError* e, char* text, size_t size) {
                      e->detail[1] & RTC_ERROR_RECORD_MASK,
                      k_regions[e->detail[1] >> RTC_ERROR_REGION_SHIFT & 3], e->detail[0]);
             break;
+        case RTC_LAUNCH_ERROR_BAD_INSTANCE: {
+            char which[96];
+            if (e->detail[1] == RTC_ERROR_BUILT)
+                snprintf(which, sizeof which, "a top level that this recording built");
+            else
+                snprintf(which, sizeof which, "structure %u of rtrCmdDeclareScene", e->detail[1]);
+            snprintf(what, sizeof what,
+                     "instance %u of %s refers to no bottom level that is built and not destroyed", e->detail[0],
+                     which);
+            break;
+        }
         case RTC_LAUNCH_ERROR_ABI:
             snprintf(
                 what, sizeof what,
@@ -81,7 +92,7 @@ void rtrFormatLaunchError(const RtrLaunchError* e, char* text, size_t size) {
             break;
     }
     if (e->code == RTC_LAUNCH_ERROR_NONE || e->code == RTC_LAUNCH_ERROR_UNFINISHED ||
-        e->code == RTC_LAUNCH_ERROR_SBT_RANGE ||
+        e->code == RTC_LAUNCH_ERROR_SBT_RANGE || e->code == RTC_LAUNCH_ERROR_BAD_INSTANCE ||
         (e->code == RTC_LAUNCH_ERROR_BAD_HANDLE && e->detail[1] & RTC_ERROR_RECORD)) {
         snprintf(text, size, "%s", what);
     } else {

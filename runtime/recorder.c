@@ -41,6 +41,7 @@ void rtrDestroyRecorder(RtrDevice d, RtrRecorder r, const VkAllocationCallbacks*
         pool = next;
     }
     rtr_free(own(r), r->launches);
+    rtr_free(own(r), r->checked);
     rtr_free(a, r);
 }
 
@@ -54,6 +55,7 @@ VkResult rtrBeginRecorder(RtrRecorder r, VkCommandBuffer cmd) {
     r->push_size = 0;
     r->stack_size = 0;
     memset(&r->scene, 0xff, sizeof r->scene); /* nothing is declared */
+    r->checked_count = 0;
     return VK_SUCCESS;
 }
 

@@ -91,7 +91,7 @@ VkDeviceSize rtrGetRecorderControlSize(RtrDevice d, uint32_t launches, uint32_t 
     if (!tiles) tiles = 1;
     if (!rounds) rounds = RTR_DEFAULT_ROUNDS;
     params = rtr_align((VkDeviceSize)param_stride(d) * tiles * rounds, 256);
-    return launches * (params + control_bytes(rounds));
+    return launches * (params + control_bytes(rounds) + (d->validation ? RTR_CHECK_BYTES : 0));
 }
 
 /* ---- One launch --------------------------------------------------------------------------- */
@@ -107,6 +107,7 @@ typedef struct Launch {
     VkBuffer indirect; /* extents on the device; size is then the largest */
     VkDeviceSize indirect_offset;
     VkDeviceSize params, control; /* in the control buffer */
+    VkDeviceSize table;           /* behind the control block; no bytes without checked top levels */
     VkDescriptorSet reserved;
 } Launch;
 
@@ -457,6 +458,7 @@ static VkResult validate(const Launch* l) {
     c.params = (VkDescriptorBufferInfo){l->r->control, l->params, (VkDeviceSize)c.slots * param_stride(d)};
     c.control = (VkDescriptorBufferInfo){l->r->control, l->control, control_bytes(l->shape.rounds)};
     c.identity = l->p->header.identity;
+    c.table = l->table;
     return rtr_validate_launch(l->r, &c);
 }
 
@@ -501,6 +503,7 @@ static VkResult take_control(Launch* l) {
     const VkDeviceSize params =
         rtr_align((VkDeviceSize)param_stride(r->device) * l->shape.tiles * l->shape.rounds, 256);
     const VkDeviceSize block = control_bytes(l->shape.rounds);
+    const VkDeviceSize table = r->checked_count ? RTR_CHECK_BYTES : 0;
     if (r->launch_count == r->launch_capacity) {
         const VkAllocationCallbacks* a = r->has_allocator ? &r->allocator : NULL;
         const uint32_t capacity = r->launch_capacity ? 2 * r->launch_capacity : 16;
@@ -511,16 +514,17 @@ static VkResult take_control(Launch* l) {
         r->launches = more;
         r->launch_capacity = capacity;
     }
-    if (params + block > r->control_size - r->control_used)
+    if (params + block + table > r->control_size - r->control_used)
         return rtr_error(r->device, VK_ERROR_OUT_OF_POOL_MEMORY, "control-region",
                          "the recorder's control region of %llu bytes is full: this launch (%u tiles, %u "
                          "rounds) needs %llu, "
                          "%llu are left (rtrGetRecorderControlSize, rtrRetireRecorder)",
                          (unsigned long long)r->control_size, l->shape.tiles, l->shape.rounds,
-                         (unsigned long long)(params + block),
+                         (unsigned long long)(params + block + table),
                          (unsigned long long)(r->control_size - r->control_used));
     l->params = r->control_offset + r->control_used;
     l->control = l->params + params;
+    l->table = l->control + block;
     return VK_SUCCESS;
 }
 
@@ -589,7 +593,7 @@ static VkResult trace(RtrRecorder r, const RtrStridedBufferRegion* raygen, const
     r->launches[r->launch_count].offset = l.control;
     r->launches[r->launch_count].size = control_bytes(l.shape.rounds);
     r->launch_count++;
-    r->control_used = l.control + control_bytes(l.shape.rounds) - r->control_offset;
+    r->control_used = l.table + (r->checked_count ? RTR_CHECK_BYTES : 0) - r->control_offset;
     return VK_SUCCESS;
 }
 

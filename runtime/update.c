@@ -38,6 +38,7 @@ VkResult rtr_record_update(RtrBuild* b, RtrAccelerationStructure src) {
     rtr_dispatch(b, RTR_KERNEL_refit_links,
                  rtr_groups(b->primitives > nodes ? b->primitives : nodes, RTR_GROUP));
     if (b->push.flags & RTR_BUILD_TOP) {
+        if ((r = rtr_check_build_instances(b, RTR_ARR_LINKS)) != VK_SUCCESS) return r;
         if ((r = rtr_for_each_input(b, emit_instances)) != VK_SUCCESS) return r;
     } else {
         for (at = 0; at < b->primitives; at += b->slot_window) {

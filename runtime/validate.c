@@ -38,6 +38,7 @@ VkResult rtr_validate_launch(RtrRecorder r, const RtrLaunchCheck* c) {
                             rtr_groups(push.count > c->slots ? push.count : c->slots, RTR_GROUP));
         rtr_compute_barrier(r);
     }
+    if ((result = rtr_check_launch_instances(r, c)) != VK_SUCCESS) return result;
     b[0].info = c->params; /* not looked at */
     push.flags = 1;
     if ((result = rtr_bind_sets(r, NULL, b, 3)) != VK_SUCCESS) return result;

@@ -56,6 +56,7 @@
 #define RTC_HDR_SINGLE_INSTANCE 23u /* top level with one active instance: its index + 1; otherwise 0 */
 #define RTC_HDR_OFFENDERS 24u /* 12 words, by the bit number of the fact: see RTC_OFFENDER_* */
 #define RTC_HDR_OFFENDERS_END 36u
+#define RTC_HDR_BAD_INSTANCE 36u /* top level: 1 + the first instance whose reference led to no structure; 0: none */
 
 /* A word of RTC_HDR_OFFENDERS in a top level: the first instance for which the fact does not
  * hold (for RTC_FACT_HAS_*: the first instance of that kind), and, where it is a geometry's
@@ -232,11 +233,14 @@
 #define RTC_LAUNCH_ERROR_UNFINISHED 6u /* lanes were still suspended when rounds ran out; detail: lanes */
 #define RTC_LAUNCH_ERROR_STACK 7u /* internal: traversal or word stack overflow */
 #define RTC_LAUNCH_ERROR_SBT_RANGE 8u /* validation: an SBT region ends behind its buffer; detail: bytes there */
+#define RTC_LAUNCH_ERROR_BAD_INSTANCE 9u /* validation: detail: instance; detail2: structure of the declared scene, or RTC_ERROR_BUILT */
 /* DETAIL2 of errors found in the table before the launch: this bit, the region (0 raygen, 1
  * miss, 2 hit, 3 callable), the record. */
 #define RTC_ERROR_RECORD 0x80000000u
 #define RTC_ERROR_REGION_SHIFT 28u
 #define RTC_ERROR_RECORD_MASK 0x0fffffffu
+/* DETAIL2 of BAD_INSTANCE: not of a declared scene but built in the same recording. */
+#define RTC_ERROR_BUILT 0xffffffffu
 
 /* ---- Reflection carried by a module ------------------------------------------
  * OpString "rtc.reflection:<index>/<count>:<base64>"; the decoded chunks joined

@@ -152,7 +152,14 @@ typedef struct RtrDeviceCreateInfo {
      * record and every record of a region whose size is given (rtrCmdTraceRaysRegions) must be
      * null or a handle of the pipeline. A launch that breaks this traces nothing and has the
      * launch error SBT_RANGE or BAD_HANDLE with the region and record; and where sizes are not
-     * given (rtrCmdTraceRays), records outside the buffer act as null instead of being read. */
+     * given (rtrCmdTraceRays), records outside the buffer act as null instead of being read.
+     * References of instances must be those of bottom levels that are bound and not destroyed
+     * when the build of the top level is recorded, and built when it runs: others become inactive,
+     * in address mode without being followed. A launch traces nothing and has the launch error
+     * BAD_INSTANCE, with the first such instance, when this happened in a top level that the same
+     * recording built or that rtrCmdDeclareScene names; the latter's references are looked at
+     * again, for bottom levels that have been destroyed since. Scratch of top levels then needs
+     * TRANSFER_DST, and launches more of the control region (rtrGetRecorderControlSize). */
     VkBool32 validation;
     /* What `device` was created with, read during this call: a pipeline whose module needs a
      * feature or extension that is not in it is then refused by name. NULL: only what the
@@ -232,8 +239,10 @@ RTR_API uint32_t rtrTranslatePushConstantRanges(uint32_t count, const VkPushCons
 #define RTR_ADDRESS_BUFFER_USAGE                                                       \
     (VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT | \
      VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT)
-/* Buffer usages of build and update scratch. */
-#define RTR_SCRATCH_BUFFER_USAGE (VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT)
+/* Buffer usages of build and update scratch (TRANSFER_DST: with validation only). */
+#define RTR_SCRATCH_BUFFER_USAGE                                              \
+    (VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT | \
+     VK_BUFFER_USAGE_TRANSFER_DST_BIT)
 /* Vertex, index, transform, AABB and instance buffers, and SBT buffers. Indices and vertex
  * components of 8 and 16 bits are read by whole words: pad such a buffer to a multiple of 4 bytes. */
 #define RTR_INPUT_BUFFER_USAGE VK_BUFFER_USAGE_STORAGE_BUFFER_BIT
@@ -348,7 +357,8 @@ RTR_API VkResult rtrUpdateAccelerationStructureDescriptors(
 /* Tells the recorder which acceleration structures the launches that follow reach, so that
  * what the host knows of them is checked when a launch is recorded (kinds of geometry, and
  * opacity where the module assumes no instance flags), rather than by the device alone.
- * Optional; replaces what was declared before; forgotten by rtrBeginRecorder. count 0:
+ * Optional; replaces what was declared before; forgotten by rtrBeginRecorder. With
+ * RtrDeviceCreateInfo::validation the device looks at its top levels before each launch. count 0:
  * nothing is declared. Structures made by copies tell the host nothing. A launch that cannot
  * be right fails with VALIDATION_FAILED ("assumption") and is not recorded. */
 RTR_API VkResult rtrCmdDeclareScene(RtrRecorder recorder, uint32_t count,

@@ -51,6 +51,7 @@
 #define RTR_ST_NODES 10u   /* encoded nodes */
 #define RTR_ST_ROOT 11u    /* inner node that is the root */
 #define RTR_ST_DEEP 12u    /* 1: deeper than RTC_MAX_DEPTH after rotating */
+#define RTR_ST_BAD_INSTANCE 13u /* first instance whose reference leads to no structure; ~0: none */
 #define RTR_ST_OFFENDERS 16u /* 12: words of RTC_HDR_OFFENDERS */
 #define RTR_ST_SUMS 64u  /* block sums and histograms start here */
 
@@ -80,6 +81,7 @@
 #define RTR_BUILD_AABBS 2u
 #define RTR_BUILD_KEEP_DEGENERATE 4u /* ALLOW_UPDATE: only NaN drops a primitive */
 #define RTR_BUILD_HAS_TRANSFORM 16u
+#define RTR_BUILD_CHECKED 32u /* check_instances left in MARKS whether a reference is good */
 
 struct RtrBuildPush {
     RTR_UINT count;          /* primitives of this dispatch */

@@ -49,5 +49,6 @@ void main() {
     else if (w == RTC_HDR_FIRST_OFFENDER) v = state[RTR_ST_OFFENDER];
     else if (w == RTC_HDR_SINGLE_INSTANCE) v = top && n == 1u ? pairs_a[0].y + 1u : 0u;
     else if (w >= RTC_HDR_OFFENDERS && w < RTC_HDR_OFFENDERS_END) v = offender(w - RTC_HDR_OFFENDERS, n);
+    else if (w == RTC_HDR_BAD_INSTANCE) v = state[RTR_ST_BAD_INSTANCE] + 1u;
     dst_header[w] = v;
 }

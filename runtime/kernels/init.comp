@@ -12,5 +12,6 @@ void main() {
         state[RTR_ST_CENTER_MAX + lane] = 0u;
     }
     if (lane == 3u) state[RTR_ST_OFFENDER] = 0xffffffffu;
+    if (lane == 4u) state[RTR_ST_BAD_INSTANCE] = 0xffffffffu;
     if (lane >= RTR_ST_OFFENDERS && lane < RTR_ST_OFFENDERS + 12u) state[lane] = 0xffffffffu;
 }

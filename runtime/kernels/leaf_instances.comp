@@ -117,11 +117,17 @@ void main() {
         uint base_lo = in_data[at + 14u];
         uint base_hi = in_data[at + 15u];
         active_ = (base_lo | base_hi) != 0u;
-        // A reference to nothing that was built here is never followed; the header's first
-        // offender tells which instance it was.
-        if (active_ && !is_structure(base_lo, base_hi)) {
+        // A reference to nothing that was built here is never followed; the header tells
+        // which instance it was.
+        bool there = true;
+        if (active_) {
+            if ((p.flags & RTR_BUILD_CHECKED) != 0u) there = marks[p.first + i] != 0u;
+            else there = is_structure(base_lo, base_hi);
+        }
+        if (!there) {
             active_ = false;
             atomicMin(state[RTR_ST_OFFENDER], p.first + i);
+            atomicMin(state[RTR_ST_BAD_INSTANCE], p.first + i);
         }
         for (uint r = 0u; r < 3u; r++) active_ = active_ && !any_nan(m[r].xyz) && !is_nan(m[r].w);
 

@@ -63,6 +63,7 @@ void main() {
                     for (uint bit = 0u; bit < RTC_HDR_OFFENDERS_END - RTC_HDR_OFFENDERS; bit++)
                         dst_header[RTC_HDR_OFFENDERS + bit] = offender(bit, n);
                     dst_header[RTC_HDR_FIRST_OFFENDER] = state[RTR_ST_OFFENDER];
+                    dst_header[RTC_HDR_BAD_INSTANCE] = state[RTR_ST_BAD_INSTANCE] + 1u;
                 }
             }
         }

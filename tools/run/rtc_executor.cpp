@@ -34,6 +34,8 @@ const char* launch_error_name(uint32_t code) {
             return "unfinished";
         case RTC_LAUNCH_ERROR_STACK:
             return "stack";
+        case RTC_LAUNCH_ERROR_BAD_INSTANCE:
+            return "bad-instance";
         default:
             return "unknown";
     }

@@ -1,0 +1,66 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#ifdef RTR_ADDRESS
+#extension GL_EXT_buffer_reference : require
+#extension GL_EXT_buffer_reference_uvec2 : require
+#endif
+// Validation: whether references of instances are those of bottom levels that are alive, by a
+// table of the host's. A lane a record. The table comes in pieces, sorted by reference:
+// in_index holds p.total entries (reference low, high, quads of the object, 0), and this
+// dispatch is about the references from (p.self_lo, p.self_hi) to (p.src_lo, p.src_hi).
+// Before a build (p.step 0) the records are instances, 64 bytes each from p.data_offset of
+// in_data on, and marks tells of each from p.first on whether it is good. Before a launch
+// (p.step 1) they are those of a top level whose header is in_transform, in_data starts
+// p.window_first quads behind its base and ends p.window_count quads later; dst_header is the
+// control block, p.geometry what detail2 is to say, p.facts: look at the header too.
+#include "common.glsl"
+#include "block.glsl"
+
+void report(uint code, uint detail, uint detail2) {
+    if (atomicCompSwap(dst_header[RTC_CTRL_ERROR], RTC_LAUNCH_ERROR_NONE, code) == RTC_LAUNCH_ERROR_NONE) {
+        dst_header[RTC_CTRL_ERROR_DETAIL] = detail;
+        dst_header[RTC_CTRL_ERROR_DETAIL2] = detail2;
+    }
+    atomicAdd(dst_header[RTC_CTRL_ERROR_COUNT], 1u);
+}
+
+bool below(uvec2 a, uvec2 b) { return a.y < b.y || (a.y == b.y && a.x < b.x); }
+
+bool good(uvec2 reference) {
+    uint lo = 0u, hi = p.total;
+    for (uint turn = 0u; turn < 32u && lo < hi; turn++) {
+        uint middle = (lo + hi) / 2u;
+        if (below(uvec2(in_index[4u * middle], in_index[4u * middle + 1u]), reference)) lo = middle + 1u;
+        else hi = middle;
+    }
+    if (lo >= p.total || in_index[4u * lo] != reference.x || in_index[4u * lo + 1u] != reference.y) return false;
+    // Alive; so what lies there may be read. Was it built?
+    uvec4 h0 = block_quad(reference.x, reference.y, 0u);
+    if (h0.xy != reference || h0.z != RTC_AS_MAGIC || h0.w != RTC_AS_KIND_BOTTOM) return false;
+    return block_quad(reference.x, reference.y, RTC_HDR_SIZE_QUADS / 4u).w <= in_index[4u * lo + 2u];
+}
+
+void main() {
+    uint i = lane_index();
+    uint at;
+    if (p.step == 0u) {
+        if (i >= p.count) return;
+        at = (p.data_offset >> 2) + i * 16u + 14u;
+    } else {
+        if (i == 0u && p.facts != 0u) {
+            if (in_transform[RTC_HDR_MAGIC] != RTC_AS_MAGIC || in_transform[RTC_HDR_KIND] != RTC_AS_KIND_TOP)
+                report(RTC_LAUNCH_ERROR_ABI, in_transform[RTC_HDR_MAGIC], p.geometry);
+            else if (in_transform[RTC_HDR_BAD_INSTANCE] != 0u)
+                report(RTC_LAUNCH_ERROR_BAD_INSTANCE, in_transform[RTC_HDR_BAD_INSTANCE] - 1u, p.geometry);
+        }
+        if (i >= p.count || in_transform[RTC_HDR_MAGIC] != RTC_AS_MAGIC || i >= in_transform[RTC_HDR_SLOT_COUNT]) return;
+        uint quad = in_transform[RTC_HDR_SLOTS] + i * RTC_INSTANCE_QUADS + 6u;
+        if (quad < p.window_first || quad - p.window_first >= p.window_count) return;
+        at = (quad - p.window_first) * 4u;
+    }
+    uvec2 reference = uvec2(in_data[at], in_data[at + 1u]);
+    if (below(reference, uvec2(p.self_lo, p.self_hi)) || below(uvec2(p.src_lo, p.src_hi), reference)) return;
+    bool is_good = reference == uvec2(0u) || good(reference);
+    if (p.step == 0u) marks[p.first + i] = is_good ? 1u : 0u;
+    else if (!is_good) report(RTC_LAUNCH_ERROR_BAD_INSTANCE, i, p.geometry);
+}

@@ -1,0 +1,245 @@
+/* RtrDeviceCreateInfo::validation: references of instances must be those of bottom levels that
+ * are bound and not destroyed. The host knows which those are; the device compares. */
+#include <stdlib.h>
+
+#include "build.h"
+
+/* ---- What is alive -------------------------------------------------------------------------- */
+
+static void lock(RtrDevice d) {
+    while (atomic_flag_test_and_set_explicit(&d->live_lock, memory_order_acquire)) {
+    }
+}
+static void unlock(RtrDevice d) { atomic_flag_clear_explicit(&d->live_lock, memory_order_release); }
+
+void rtr_add_live(RtrAccelerationStructure as) {
+    RtrDevice d = as->device;
+    if (!d->validation || as->type != VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_NV) return;
+    lock(d);
+    as->live_next = d->live;
+    if (d->live) d->live->live_before = as;
+    d->live = as;
+    unlock(d);
+}
+
+void rtr_remove_live(RtrAccelerationStructure as) {
+    RtrDevice d = as->device;
+    if (!d->validation || !as->buffer || as->type != VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_NV) return;
+    lock(d);
+    if (as->live_next) as->live_next->live_before = as->live_before;
+    if (as->live_before)
+        as->live_before->live_next = as->live_next;
+    else
+        d->live = as->live_next;
+    unlock(d);
+}
+
+typedef struct Entry {
+    uint32_t lo, hi, quads, unused;
+} Entry;
+
+static uint64_t reference(const Entry* e) { return (uint64_t)e->hi << 32 | e->lo; }
+
+static int by_reference(const void* a, const void* b) {
+    const uint64_t x = reference(a), y = reference(b);
+    return x < y ? -1 : x > y;
+}
+
+/* The bottom levels that a top level in `heap` (NULL: address mode) can refer to, sorted. */
+static VkResult make_table(RtrRecorder r, RtrHeap heap, Entry** table, uint32_t* count) {
+    RtrDevice d = r->device;
+    const VkAllocationCallbacks* a = r->has_allocator ? &r->allocator : NULL;
+    uint32_t room = 0, n = 0;
+    RtrAccelerationStructure as;
+    for (;;) {
+        *table = rtr_alloc(a, room * sizeof **table);
+        if (!*table) return VK_ERROR_OUT_OF_HOST_MEMORY;
+        lock(d);
+        for (n = 0, as = d->live; as; as = as->live_next) {
+            if (as->heap != heap) continue;
+            if (n < room) {
+                const VkDeviceSize quads = as->size / RTC_QUAD_BYTES;
+                (*table)[n].lo = (uint32_t)as->base;
+                (*table)[n].hi = (uint32_t)(as->base >> 32);
+                (*table)[n].quads = quads > 0xffffffffu ? 0xffffffffu : (uint32_t)quads;
+            }
+            n++;
+        }
+        unlock(d);
+        if (n <= room) break;
+        rtr_free(a, *table);
+        room = n;
+    }
+    *count = n;
+    qsort(*table, n, sizeof **table, by_reference);
+    return VK_SUCCESS;
+}
+
+/* ---- Pieces of the table, and what is looked at with each ------------------------------------- */
+
+typedef struct Check {
+    RtrRecorder r;
+    RtrHeap heap;
+    VkDescriptorBufferInfo table; /* where the pieces go */
+    struct RtrBuildPush push;
+    /* Looks at all records with the piece that is in place. */
+    VkResult (*look)(struct Check* c);
+    RtrBuild* build;             /* before a build */
+    RtrAccelerationStructure top; /* before a launch, with its control block */
+    VkDescriptorBufferInfo control;
+} Check;
+
+static VkResult look_through(Check* c) {
+    RtrRecorder r = c->r;
+    const RtrDeviceTable* vk = &r->device->vk;
+    const uint32_t room = (uint32_t)(c->table.range / sizeof(Entry));
+    Entry* entries;
+    uint32_t count, at = 0;
+    VkResult result = make_table(r, c->heap, &entries, &count);
+    if (result != VK_SUCCESS) return result;
+    do {
+        const uint32_t n = count - at < room ? count - at : room;
+        const uint64_t first = at ? reference(&entries[at]) : 0;
+        const uint64_t last = at + n < count ? reference(&entries[at + n]) - 1 : ~0ull;
+        rtr_barrier(r, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_WRITE_BIT,
+                    VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT);
+        if (n) vk->CmdUpdateBuffer(r->cmd, c->table.buffer, c->table.offset, n * sizeof(Entry), &entries[at]);
+        rtr_barrier(r, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT,
+                    VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT);
+        c->push.total = n;
+        c->push.self_lo = (uint32_t)first;
+        c->push.self_hi = (uint32_t)(first >> 32);
+        c->push.src_lo = (uint32_t)last;
+        c->push.src_hi = (uint32_t)(last >> 32);
+        result = c->look(c);
+        c->push.facts = 0;
+        at += n;
+    } while (result == VK_SUCCESS && at < count);
+    rtr_free(r->has_allocator ? &r->allocator : NULL, entries);
+    return result;
+}
+
+/* `header` and `marks`: the buffers of the kernel's other step stand in for what it does not use. */
+static VkResult dispatch(Check* c, VkDescriptorBufferInfo records, VkDescriptorBufferInfo header,
+                         VkDescriptorBufferInfo marks, VkDescriptorBufferInfo control) {
+    const RtrBinding bindings[5] = {{0, RTR_IN_DATA, records},
+                                    {0, RTR_IN_INDEX, c->table},
+                                    {0, RTR_IN_TRANSFORM, header},
+                                    {1, RTR_ARR_MARKS, marks},
+                                    {1, RTR_ARR_DST_HEADER, control}};
+    VkResult result = rtr_bind_sets(c->r, c->heap, bindings, 5);
+    if (result != VK_SUCCESS) return result;
+    rtr_dispatch_kernel(c->r, c->heap ? RTR_KERNEL_check_instances : RTR_KERNEL_check_instances_address, &c->push,
+                        rtr_groups(c->push.count, RTR_GROUP));
+    rtr_compute_barrier(c->r);
+    return VK_SUCCESS;
+}
+
+/* ---- Before a build ------------------------------------------------------------------------------ */
+
+static VkResult look_at_input(Check* c) {
+    const RtrBuild* b = c->build;
+    const uint32_t most = (b->device->limits.maxStorageBufferRange - 1024u) / 64u;
+    VkDescriptorBufferInfo records = {b->instance_data, 0, 0}, marks = {b->scratch, 0, 0};
+    uint32_t at;
+    marks.offset = b->scratch_offset + b->layout.offset[RTR_ARR_MARKS];
+    marks.range = rtr_min_size(b->layout.size[RTR_ARR_MARKS], b->device->limits.maxStorageBufferRange);
+    for (at = 0; at < b->primitives; at += most) {
+        const VkDeviceSize begin = b->instance_offset + 64ull * at;
+        VkResult result;
+        c->push.first = at;
+        c->push.count = b->primitives - at < most ? b->primitives - at : most;
+        records.offset = begin / 256 * 256;
+        records.range = begin - records.offset + 64ull * c->push.count;
+        c->push.data_offset = (uint32_t)(begin - records.offset);
+        if ((result = dispatch(c, records, c->table, marks, marks)) != VK_SUCCESS) return result;
+    }
+    return VK_SUCCESS;
+}
+
+VkResult rtr_check_build_instances(RtrBuild* b, uint32_t end) {
+    Check c;
+    if (!b->device->validation || !b->primitives) return VK_SUCCESS;
+    memset(&c, 0, sizeof c);
+    c.r = b->recorder;
+    c.heap = b->dst->heap;
+    c.build = b;
+    c.look = look_at_input;
+    c.table.buffer = b->scratch;
+    c.table.offset = b->scratch_offset + b->layout.offset[RTR_ARR_LEAF_BOX];
+    c.table.range =
+        rtr_min_size(b->layout.offset[end] - b->layout.offset[RTR_ARR_LEAF_BOX], RTR_CHECK_BYTES);
+    b->push.flags |= RTR_BUILD_CHECKED;
+    return look_through(&c);
+}
+
+/* ---- Before a launch ------------------------------------------------------------------------------ */
+
+VkResult rtr_add_checked(RtrRecorder r, RtrAccelerationStructure top, uint32_t index) {
+    uint32_t i;
+    for (i = 0; i < r->checked_count; i++)
+        if (r->checked[i].as == top && r->checked[i].index == index) return VK_SUCCESS;
+    if (r->checked_count == r->checked_capacity) {
+        const VkAllocationCallbacks* a = r->has_allocator ? &r->allocator : NULL;
+        const uint32_t capacity = r->checked_capacity ? 2 * r->checked_capacity : 8;
+        RtrCheckedTop* more = rtr_alloc(a, capacity * sizeof *more);
+        if (!more) return VK_ERROR_OUT_OF_HOST_MEMORY;
+        if (r->checked_count) memcpy(more, r->checked, r->checked_count * sizeof *more);
+        rtr_free(a, r->checked);
+        r->checked = more;
+        r->checked_capacity = capacity;
+    }
+    r->checked[r->checked_count].as = top;
+    r->checked[r->checked_count++].index = index;
+    return VK_SUCCESS;
+}
+
+void rtr_forget_declared(RtrRecorder r) {
+    uint32_t i, kept = 0;
+    for (i = 0; i < r->checked_count; i++)
+        if (r->checked[i].index == RTC_ERROR_BUILT) r->checked[kept++] = r->checked[i];
+    r->checked_count = kept;
+}
+
+static VkResult look_at_records(Check* c) {
+    const RtrAccelerationStructure top = c->top;
+    const VkDeviceSize window = c->r->device->limits.maxStorageBufferRange / 256 * 256;
+    VkDescriptorBufferInfo records = {top->buffer, 0, 0};
+    VkDeviceSize at;
+    for (at = 0; at < top->size; at += window) {
+        VkResult result;
+        records.offset = top->offset + at;
+        records.range = rtr_min_size(top->size - at, window);
+        c->push.window_first = (uint32_t)(at / RTC_QUAD_BYTES);
+        c->push.window_count = (uint32_t)(records.range / RTC_QUAD_BYTES);
+        result = dispatch(c, records, rtr_header_info(top), c->control, c->control);
+        if (result != VK_SUCCESS) return result;
+    }
+    return VK_SUCCESS;
+}
+
+VkResult rtr_check_launch_instances(RtrRecorder r, const RtrLaunchCheck* check) {
+    uint32_t i;
+    for (i = 0; i < r->checked_count; i++) {
+        const RtrCheckedTop* t = &r->checked[i];
+        const uint64_t most = t->as->size / (RTC_INSTANCE_QUADS * RTC_QUAD_BYTES);
+        Check c;
+        VkResult result;
+        if (!t->as->buffer) continue;
+        memset(&c, 0, sizeof c);
+        c.r = r;
+        c.heap = t->as->heap;
+        c.top = t->as;
+        c.control = check->control;
+        c.look = look_at_records;
+        c.table.buffer = r->control;
+        c.table.offset = check->table;
+        c.table.range = RTR_CHECK_BYTES;
+        c.push.step = 1;
+        c.push.facts = 1;
+        c.push.geometry = t->index;
+        c.push.count = (uint32_t)most;
+        if ((result = look_through(&c)) != VK_SUCCESS) return result;
+    }
+    return VK_SUCCESS;
+}
