@@ -24,16 +24,17 @@ static unsigned mesa_major(const char* info) {
 }
 
 /* Measured choices, not guesses: lavapipe 22.3 likes texel fetch, while-while and a
- * shared stack; lavapipe 25 texel fetch and local arrays; GPUs local arrays and small
- * groups. lavapipe 22.3 also ends every loop once an invocation group has spent 65535
+ * shared stack; lavapipe 25 texel fetch and local arrays; GPUs device addresses, local
+ * arrays and small groups. lavapipe 22.3 also ends every loop once an invocation group has spent 65535
  * iterations in all its loops together, so a lane must suspend before its share. */
-static void recommend(RtrPhysicalDeviceSupport* s, bool llvmpipe) {
+static void recommend(RtrPhysicalDeviceSupport* s, bool cpu, bool llvmpipe) {
     RtrTraceOptions* o = &s->recommended;
     o->fetch = RTR_FETCH_STORAGE;
     o->whileWhile = 0;
     o->sharedStack = 0;
     o->workgroupSize = 32;
     o->stepBudget = 0;
+    s->recommendAddresses = s->addressMode && !cpu;
     if (!llvmpipe) return;
     o->fetch = RTR_FETCH_TEXEL;
     o->workgroupSize = 64;
@@ -110,7 +111,7 @@ VkResult rtrGetPhysicalDeviceSupport(VkInstance instance, VkPhysicalDevice physi
     pSupport->maxHeapSizeStorage = storage / 256 * 256;
 
     llvmpipe = v12 && driver.driverID == VK_DRIVER_ID_MESA_LLVMPIPE;
-    recommend(pSupport, llvmpipe);
+    recommend(pSupport, properties.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU, llvmpipe);
     return VK_SUCCESS;
 }
 

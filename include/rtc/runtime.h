@@ -113,6 +113,7 @@ typedef struct RtrPhysicalDeviceSupport {
     VkBool32 needsResumableModules;  /* the device ends or kills long loops: use modules compiled resumable */
     VkBool32 heapMode;               /* always true when supported */
     VkBool32 addressMode;            /* the feature bufferDeviceAddress is there, see RtrDeviceCreateInfo */
+    VkBool32 recommendAddresses;     /* address mode is there and nodes are read faster by address than from a heap */
     VkDeviceSize maxHeapSizeTexel;   /* bytes of heap that RTR_FETCH_TEXEL can reach */
     VkDeviceSize maxHeapSizeStorage; /* bytes of heap that RTR_FETCH_STORAGE can reach */
     uint32_t subgroupSize;

@@ -5,6 +5,8 @@
 #include <ctime>
 #include <thread>
 
+#include "pipeline_statistics.h"
+
 namespace rtc::bench {
 namespace {
 
@@ -24,7 +26,8 @@ bool device_has(const std::string& wanted, const char* extension) {
 
 }  // namespace
 
-BenchDevice::BenchDevice(const std::string& device, const std::vector<std::string>& native, bool validate) {
+BenchDevice::BenchDevice(const std::string& device, const std::vector<std::string>& native, bool validate,
+                         bool statistics) {
     for (const std::string& name : native) {
         if (name == "none") continue;
         if (name == "nv" || (name == "auto" && device_has(device, VK_NV_RAY_TRACING_EXTENSION_NAME)))
@@ -35,6 +38,7 @@ BenchDevice::BenchDevice(const std::string& device, const std::vector<std::strin
     tools::ContextOptions options;
     options.device = device;
     options.validate = validate;
+    if (statistics) tools::want_pipeline_statistics(options, statistics_features_);
     for (Kind kind : kinds) {
         requirements_.push_back(std::make_unique<native::Requirements>(kind));
         requirements_.back()->apply(options);

@@ -11,10 +11,12 @@
 
 namespace rtc::bench {
 
-// `native`: of "nv", "khr", "auto" (what the device has) and "none". Throws tools::Error.
+// `native`: of "nv", "khr", "auto" (what the device has) and "none". `statistics`: rtc's pipelines keep what the driver
+// tells of them (pipeline_statistics.h). Throws tools::Error.
 class BenchDevice {
   public:
-    BenchDevice(const std::string& device, const std::vector<std::string>& native, bool validate);
+    BenchDevice(const std::string& device, const std::vector<std::string>& native, bool validate,
+                bool statistics = false);
 
     std::vector<native::Requirements::Kind> kinds;
     std::unique_ptr<tools::Context> context;
@@ -26,6 +28,7 @@ class BenchDevice {
     bool is_cpu() const { return context->properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU; }
 
   private:
+    VkPhysicalDevicePipelineExecutablePropertiesFeaturesKHR statistics_features_{};
     std::vector<std::unique_ptr<native::Requirements>> requirements_;  // the context's features lie in them
     std::unique_ptr<tools::GpuTimer> timer_;
 };

@@ -125,18 +125,16 @@ class Bench {
         uint32_t count = 0;
         for (const tools::RayTracingJob& pass : job.passes) {
             std::string json;
-            if (extract_reflection_json(modules_.get(options_.workload, pass, variant, resumable()), json))
+            if (extract_reflection_json(modules_.get(options_.workload, pass, variant, *device_), json))
                 count += nlohmann::json::parse(json).at("instructions").get<uint32_t>();
         }
         return count;
     }
 
-    bool resumable() const { return device_->support.needsResumableModules; }
-
     void run_scene(const std::string& name) {
         std::fprintf(stderr, "rtc-bench: %s\n", name.c_str());
         const tools::Scene scene = bench_scene(name, options_.scale);
-        const auto structures = std::make_shared<RtcScene>(*device_, scene, false);
+        const auto structures = std::make_shared<RtcScene>(*device_, scene, false, by_address({}, *device_));
         std::vector<Cell> cells(columns_.size());
         std::vector<Running> running;
         columns_.back().assume.clear();

@@ -13,6 +13,7 @@
 #include "bench_scenes.h"
 #include "commands.h"
 #include "error.h"
+#include "pipeline_statistics.h"
 #include "trace_report.h"
 #include "trace_runner.h"
 
@@ -20,12 +21,14 @@ namespace rtc::bench {
 namespace {
 
 using tools::Context;
-using tools::ContextOptions;
 using tools::Error;
 using tools::RtcDevice;
 using tools::RtcScene;
 using Clock = std::chrono::steady_clock;
 using Kind = native::Requirements::Kind;
+
+// By build preference and addressing.
+using SceneVariants = std::map<std::pair<bool, bool>, std::shared_ptr<RtcScene>>;
 
 struct Options {
     std::vector<std::string> scenes{"cornell", "terrain", "spheres", "blob", "soup", "strands", "instances"};
@@ -35,7 +38,7 @@ struct Options {
     uint32_t width = 0, height = 0;  // 0: by the kind of device
     int repeats = 9;
     double scale = 1, native_limit = 8, warm_up = 0.15;
-    bool validate = false;
+    bool validate = false, statistics = false;
 };
 
 double seconds_since(Clock::time_point start) {
@@ -47,7 +50,7 @@ class Bench {
     explicit Bench(const Options& options)
         : options_(options),
           modules_(options.save_modules),
-          bench_device_(options.device, options.native, options.validate),
+          bench_device_(options.device, options.native, options.validate, options.statistics),
           context_(*bench_device_.context),
           device_(*bench_device_.rtc) {
         report_.device = bench_device_.description;
@@ -72,10 +75,10 @@ class Bench {
 
     void run_scene(const std::string& name) {
         const tools::Scene scene = bench_scene(name, options_.scale);
-        std::map<bool, std::shared_ptr<RtcScene>> structures;
+        SceneVariants structures;
         for (const TraceVariant& variant : variants_)
-            if (std::shared_ptr<RtcScene>& built = structures[variant.fast_build]; !built)
-                built = std::make_shared<RtcScene>(device_, scene, variant.fast_build);
+            if (std::shared_ptr<RtcScene>& built = structures[{variant.fast_build, by_address(variant, device_)}]; !built)
+                built = std::make_shared<RtcScene>(device_, scene, variant.fast_build, by_address(variant, device_));
         for (const std::string& workload : options_.workloads)
             run_workload(name, scene, structures, make_workload(workload, report_.width, report_.height));
         std::string title = name + ": " + std::to_string(scene.triangle_count()) + " triangles";
@@ -93,7 +96,7 @@ class Bench {
     };
 
     void run_workload(const std::string& scene_name, const tools::Scene& scene,
-                      const std::map<bool, std::shared_ptr<RtcScene>>& structures, const Workload& workload) {
+                      const SceneVariants& structures, const Workload& workload) {
         std::vector<Entry> entries;
         auto add = [&](const std::string& runner_name, bool is_native, const auto& make) {
             TraceRow row;
@@ -122,8 +125,12 @@ class Bench {
                 [&] { return make_native_runner(context_, scene, workload, kind); });
         for (const TraceVariant& variant : variants_)
             add(variant.name, false, [&] {
-                return make_rtc_runner(device_, scene, structures.at(variant.fast_build), workload, variant,
-                                       modules_);
+                auto runner = make_rtc_runner(device_, scene,
+                                              structures.at({variant.fast_build, by_address(variant, device_)}),
+                                              workload, variant, modules_);
+                if (!runner->statistics.empty())
+                    std::printf("%s, %s: %s\n", workload.name.c_str(), variant.name.c_str(), runner->statistics.c_str());
+                return runner;
             });
         measure(entries);
     }
@@ -256,6 +263,7 @@ void add_trace_command(CLI::App& app) {
         ->capture_default_str();
     trace.add_option("--save-modules", options->save_modules, "folder to keep the compiled modules in");
     trace.add_option("--device", options->device, "index or part of the name; default: $RTC_DEVICE, else the best");
+    trace.add_flag("--statistics", options->statistics, "print what the driver tells of rtc's pipelines: registers, spills");
     trace.add_flag("--validate", options->validate, "Vulkan validation; any message is an error");
     trace.add_option("--json", options->json_file, "write every timing to this file");
     trace.add_option("--markdown", options->markdown_file, "write the tables to this file");

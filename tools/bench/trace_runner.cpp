@@ -6,6 +6,7 @@
 #include "../native/glsl.h"
 #include "error.h"
 #include "job_descriptors.h"
+#include "pipeline_statistics.h"
 
 namespace rtc::bench {
 namespace {
@@ -40,10 +41,13 @@ class RtcRunner final : public TraceRunner {
           structures_(std::move(structures)),
           job_(make_job(device.context, scene, workload, variant.ext_dialect)) {
         strip_color(workload, job_);
-        for (const RayTracingJob& pass : job_.passes)
+        for (const RayTracingJob& pass : job_.passes) {
             launchers_.push_back(std::make_unique<RtcLauncher>(
                 device, *structures_, pass,
-                modules.get(workload.name, pass, variant, device.support.needsResumableModules), &variant.options));
+                modules.get(workload.name, pass, variant, device), &variant.options));
+            for (const auto& [what, value] : tools::pipeline_statistics(device.context, launchers_.back()->info().pipeline))
+                statistics += (statistics.empty() ? "" : ", ") + what + " " + value;
+        }
     }
 
     void record(VkCommandBuffer commands, uint32_t sample) override {
@@ -145,14 +149,23 @@ Workload make_workload(const std::string& name, uint32_t width, uint32_t height)
     return workload;
 }
 
-const std::vector<uint32_t>& ModuleCache::get(const std::string& workload, const RayTracingJob& pass,
-                                              const TraceVariant& variant, bool device_needs_resumable) {
+bool by_address(const TraceVariant& variant, const tools::RtcDevice& device) {
     namespace fs = std::filesystem;
-    const bool resumable = variant.resumable < 0 ? device_needs_resumable : variant.resumable != 0;
+    if (variant.addressing == tools::Addressing::Recommended && !variant.modules.empty())
+        for (const fs::directory_entry& file : fs::directory_iterator(variant.modules))
+            if (file.path().extension() == ".spv") return tools::is_address_module(tools::read_words_file(file.path().string()));
+    return device.by_address(variant.addressing);
+}
+
+const std::vector<uint32_t>& ModuleCache::get(const std::string& workload, const RayTracingJob& pass,
+                                              const TraceVariant& variant, const tools::RtcDevice& device) {
+    namespace fs = std::filesystem;
+    const bool resumable = variant.resumable < 0 ? device.support.needsResumableModules : variant.resumable != 0;
     const std::string stem = workload + "-" + fs::path(pass.pipeline.shaders[0].file).stem().string();
-    const std::string key = stem + (resumable ? " resumable" : "") + (variant.optimize ? " O" : "") +
-                            (variant.ext_dialect ? " ext" : "") + (variant.specialize ? "" : " whole") + " " +
-                            variant.assume + " " + variant.modules;
+    const bool addresses = by_address(variant, device);
+    const std::string key = stem + (resumable ? " resumable" : "") + (addresses ? " address" : "") +
+                            (variant.optimize ? " O" : "") + (variant.ext_dialect ? " ext" : "") +
+                            (variant.specialize ? "" : " whole") + " " + variant.assume + " " + variant.modules;
     if (const auto found = modules_.find(key); found != modules_.end()) return found->second;
     if (!variant.modules.empty())
         return modules_[key] = tools::read_words_file(variant.modules + "/" + stem + ".spv");
@@ -161,6 +174,7 @@ const std::vector<uint32_t>& ModuleCache::get(const std::string& workload, const
     options.resumable = resumable;
     options.specialize = variant.specialize;
     options.assume = variant.assume;
+    options.addresses = addresses;
     std::vector<uint32_t> words = tools::compile_job(pass.pipeline, options).words;
     if (!save_folder_.empty()) {
         fs::create_directories(save_folder_);

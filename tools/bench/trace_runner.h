@@ -39,7 +39,11 @@ class TraceRunner {
     virtual void set_size(uint32_t, uint32_t) {}
 
     const std::string name;
+    std::string statistics;  // what the driver tells of the compiled pipelines, as "registers 64, ..."
 };
+
+// Whether the variant's structures are reached by device address: its modules decide where it brings some.
+bool by_address(const TraceVariant& variant, const tools::RtcDevice& device);
 
 // Compiles each pass once for all scenes.
 class ModuleCache {
@@ -47,7 +51,7 @@ class ModuleCache {
     explicit ModuleCache(std::string save_folder) : save_folder_(std::move(save_folder)) {}
     // File name in a folder of modules: WORKLOAD-PASS.spv.
     const std::vector<uint32_t>& get(const std::string& workload, const tools::RayTracingJob& pass,
-                                     const TraceVariant& variant, bool device_needs_resumable);
+                                     const TraceVariant& variant, const tools::RtcDevice& device);
 
   private:
     std::string save_folder_;

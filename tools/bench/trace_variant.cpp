@@ -47,6 +47,8 @@ const std::map<std::string, Setter>& setters() {
         {"workgroup", [](auto& v, auto& key, auto& value) { v.options.workgroupSize = number(key, value); }},
         {"budget", [](auto& v, auto& key, auto& value) { v.options.stepBudget = number(key, value); }},
         {"build", [](auto& v, auto& key, auto& value) { v.fast_build = choice(key, value, {"trace", "fast"}); }},
+        {"addressing",
+         [](auto& v, auto&, auto& value) { v.addressing = tools::addressing_from_name(value); }},
         {"resumable", [](auto& v, auto& key, auto& value) { v.resumable = int(choice(key, value, {"0", "1"})); }},
         {"optimize", [](auto& v, auto& key, auto& value) { v.optimize = choice(key, value, {"0", "1"}); }},
         {"specialize", [](auto& v, auto& key, auto& value) { v.specialize = choice(key, value, {"0", "1"}); }},
@@ -83,9 +85,9 @@ TraceVariant parse_variant(const std::string& text) {
 
 const char* variant_help() {
     return "a column of rtc, as KEY=VALUE,... (may be repeated; none: the device's defaults). Keys: name=TEXT, "
-           "fetch=texel|storage, loop=if|while, stack=ENTRIES in shared memory (0: local), workgroup=LANES, "
-           "budget=TURNS before a lane suspends (0: never), build=trace|fast, resumable=0|1, optimize=0|1, specialize=0|1, assume=NAME+NAME, "
-           "dialect=nv|ext, modules=FOLDER written by --save-modules";
+           "addressing=heap|address, fetch=texel|storage in a heap, loop=if|while, stack=ENTRIES in shared memory (0: "
+           "local), workgroup=LANES, budget=TURNS before a lane suspends (0: never), build=trace|fast, resumable=0|1, "
+           "optimize=0|1, specialize=0|1, assume=NAME+NAME, dialect=nv|ext, modules=FOLDER written by --save-modules";
 }
 
 std::string fetch_name(RtrFetch fetch) { return fetch == RTR_FETCH_TEXEL ? "texel" : "storage"; }

@@ -6,12 +6,15 @@
 #include <string>
 #include <vector>
 
+#include "addressing.h"
+
 namespace rtc::bench {
 
 struct TraceVariant {
     std::string name;  // the text it was parsed from, or "rtc"
     RtrTraceOptions options = RTR_TRACE_OPTIONS_DEFAULT;
     bool fast_build = false;
+    tools::Addressing addressing = tools::Addressing::Recommended;
     int resumable = -1;  // -1: as the device needs
     bool optimize = true;
     bool ext_dialect = false;

@@ -17,6 +17,8 @@ VkDeviceMemory allocate(const Context& context, const VkMemoryRequirements& need
     uint32_t type = ~0u;
     if (kind == MemoryKind::Device)
         type = context.memory_type(needed.memoryTypeBits, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT);
+    if (kind == MemoryKind::Shared)
+        type = context.memory_type(needed.memoryTypeBits, host | VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT);
     if (kind == MemoryKind::Readback)
         type = context.memory_type(needed.memoryTypeBits, host | VK_MEMORY_PROPERTY_HOST_CACHED_BIT);
     if (type == ~0u) type = context.memory_type(needed.memoryTypeBits, kind == MemoryKind::Device ? 0 : host);

@@ -14,6 +14,7 @@ namespace rtc::tools {
 enum class MemoryKind {
     Device,   // device local
     Host,     // host visible and coherent, for writing
+    Shared,   // host visible and coherent, on the device where it has such memory
     Readback  // host visible and coherent, cached where the device has it
 };
 

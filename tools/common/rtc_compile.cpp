@@ -36,6 +36,9 @@ Options make_options(const JobPipeline& pipeline, const CompileOptions& wanted) 
             "the optimisation level");
     require(rtcc_options_set_debug_info(options.get(), wanted.debug_info), "debug info");
     require(rtcc_options_set_accuracy(options.get(), wanted.accuracy), "the accuracy");
+    require(rtcc_options_set_addressing(
+                options.get(), wanted.addresses ? RTCC_ADDRESSING_ADDRESS : RTCC_ADDRESSING_HEAP),
+            "the addressing mode");
     require(rtcc_options_set_resumable(options.get(), wanted.resumable), "resumable");
     require(rtcc_options_set_specialize(options.get(), wanted.specialize), "specialize");
     require(rtcc_options_assume(options.get(), wanted.assume.c_str()), "an assumption");
@@ -87,6 +90,13 @@ std::vector<uint32_t> read_words_file(const std::string& path) {
     std::vector<uint32_t> words(bytes.size() / 4);
     std::memcpy(words.data(), bytes.data(), bytes.size());
     return words;
+}
+
+bool is_address_module(const std::vector<uint32_t>& words) {
+    Compiler compiler(rtcc_compiler_create());
+    Result result(rtcc_reflect_module(compiler.get(), "module", words.data(), words.size()));
+    const rtcc_reflection* reflection = rtcc_result_reflection(result.get());
+    return reflection && (reflection->flags & RTC_MODULE_ADDRESS_MODE);
 }
 
 CompiledModule compile_job(const JobPipeline& job, const CompileOptions& wanted) {

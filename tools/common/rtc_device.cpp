@@ -41,7 +41,12 @@ RtcDevice::RtcDevice(const Context& context_)
     info.device = context.device;
     info.pfnGetInstanceProcAddr = vkGetInstanceProcAddr;
     info.pMessenger = &messenger;
+    info.bufferDeviceAddress = context.device_addresses;
     check(rtrCreateDevice(&info, nullptr, &handle), "rtrCreateDevice");
+}
+
+bool RtcDevice::by_address(Addressing wanted) const {
+    return tools::by_address(context, wanted, support.recommendAddresses);
 }
 
 RtcDevice::~RtcDevice() { rtrDestroyDevice(handle, nullptr); }

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "addressing.h"
 #include "job_descriptors.h"
 #include "ray_tracing_job.h"
 #include "resources.h"
@@ -28,6 +29,9 @@ class RtcDevice {
     RtrDevice handle = nullptr;
     RtrPhysicalDeviceSupport support{};
 
+    // Whether structures are to be reached by device address, see tools::by_address.
+    bool by_address(Addressing wanted) const;
+
     // Throws an Error with what the runtime said since the last one.
     void check(VkResult result, const char* call) const;
 
@@ -38,12 +42,13 @@ class RtcDevice {
 // A scene's acceleration structures, built on the device.
 class RtcScene {
   public:
-    RtcScene(const RtcDevice& device, const Scene& scene, bool fast_build = false);
+    // `addresses`: for modules of address mode; without, for those that read a heap.
+    RtcScene(const RtcDevice& device, const Scene& scene, bool fast_build = false, bool addresses = false);
     ~RtcScene();
     RtcScene(const RtcScene&) = delete;
     RtcScene& operator=(const RtcScene&) = delete;
 
-    RtrHeap heap = nullptr;
+    RtrHeap heap = nullptr;  // null in address mode
     RtrAccelerationStructure top = nullptr;
     VkDescriptorBufferInfo descriptor() const;
     double build_seconds = 0;  // wall time of recording, building and waiting
@@ -51,7 +56,7 @@ class RtcScene {
 
   private:
     const RtcDevice& device_;
-    Buffer heap_buffer_;
+    Buffer memory_;
     std::vector<RtrAccelerationStructure> bottoms_;
 };
 

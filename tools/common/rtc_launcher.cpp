@@ -3,6 +3,7 @@
 #include <cstring>
 
 #include "error.h"
+#include "pipeline_statistics.h"
 #include "rtc_device.h"
 
 namespace rtc::tools {
@@ -60,6 +61,7 @@ RtcLauncher::RtcLauncher(const RtcDevice& device, const RtcScene& scene, const R
     info.pushConstantRangeCount = range.size ? 1 : 0;
     info.pPushConstantRanges = &range;
     info.pOptions = options;
+    info.flags = statistics_flag(device.context);
     device.check(rtrCreateRayTracingPipeline(device.handle, VK_NULL_HANDLE, &info, nullptr, &pipeline_),
                  "rtrCreateRayTracingPipeline");
     create_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -99,7 +101,7 @@ void RtcLauncher::make_recorder() {
     const bool resumable = info().moduleFlags & RTC_MODULE_RESUMABLE;
     const VkDeviceSize control_size =
         rtrGetRecorderControlSize(device_.handle, kLaunches, tiles, resumable ? kRounds : 1);
-    control_ = Buffer(device_.context, control_size, RTR_CONTROL_BUFFER_USAGE, MemoryKind::Host);
+    control_ = Buffer(device_.context, control_size, RTR_CONTROL_BUFFER_USAGE, MemoryKind::Shared);
     RtrRecorderCreateInfo recorderInfo{};
     recorderInfo.controlBuffer = control_.handle;
     recorderInfo.controlSize = control_size;
@@ -144,7 +146,7 @@ void RtcLauncher::use_scene(const RtcScene& scene) {
 void RtcLauncher::record(VkCommandBuffer commands, const std::vector<uint8_t>& push_constants) {
     if (commands != recording_) {
         device_.check(rtrBeginRecorder(recorder_, commands), "rtrBeginRecorder");
-        device_.check(rtrCmdSetHeap(recorder_, heap_), "rtrCmdSetHeap");
+        if (heap_) device_.check(rtrCmdSetHeap(recorder_, heap_), "rtrCmdSetHeap");
         if (scratch_.handle)
             device_.check(rtrCmdSetLaunchScratch(recorder_, scratch_.handle, 0, scratch_.size),
                           "rtrCmdSetLaunchScratch");

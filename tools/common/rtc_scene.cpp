@@ -77,7 +77,8 @@ VkAccelerationStructureInstanceNV convert(const Instance& instance, uint64_t ref
 
 }  // namespace
 
-RtcScene::RtcScene(const RtcDevice& device, const Scene& scene, bool fast_build) : device_(device) {
+RtcScene::RtcScene(const RtcDevice& device, const Scene& scene, bool fast_build, bool addresses)
+    : device_(device) {
     const auto start = std::chrono::steady_clock::now();
     const Context& context = device.context;
     const VkBuildAccelerationStructureFlagsNV flags =
@@ -127,17 +128,26 @@ RtcScene::RtcScene(const RtcDevice& device, const Scene& scene, bool fast_build)
             scratch_size, requirement(device.handle, structure,
                                       VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_BUILD_SCRATCH_NV));
     }
-    const VkDeviceSize heap_size = bytes + 2 * kAlign;
-    heap_buffer_ = Buffer(context, heap_size, RTR_HEAP_BUFFER_USAGE, MemoryKind::Device);
-    RtrHeapCreateInfo heapInfo{};
-    heapInfo.buffer = heap_buffer_.handle;
-    heapInfo.size = heap_size;
-    device.check(rtrCreateHeap(device.handle, &heapInfo, nullptr, &heap), "rtrCreateHeap");
+    const VkDeviceSize size = bytes + 2 * kAlign;
+    memory_ = Buffer(context, size, addresses ? RTR_ADDRESS_BUFFER_USAGE : RTR_HEAP_BUFFER_USAGE, MemoryKind::Device);
+    if (!addresses) {
+        RtrHeapCreateInfo heapInfo{};
+        heapInfo.buffer = memory_.handle;
+        heapInfo.size = size;
+        device.check(rtrCreateHeap(device.handle, &heapInfo, nullptr, &heap), "rtrCreateHeap");
+    }
+    VkDeviceSize used = 0;
     for (size_t i = 0; i < all.size(); ++i) {
         RtrBindAccelerationStructureMemoryInfo bind{};
         bind.accelerationStructure = all[i];
-        bind.heap = heap;
-        device.check(rtrAllocateHeapRange(heap, sizes[i], 0, &bind.heapOffset), "rtrAllocateHeapRange");
+        if (addresses) {
+            bind.buffer = memory_.handle;
+            bind.bufferOffset = used;
+            used += sizes[i];
+        } else {
+            bind.heap = heap;
+            device.check(rtrAllocateHeapRange(heap, sizes[i], 0, &bind.heapOffset), "rtrAllocateHeapRange");
+        }
         device.check(rtrBindAccelerationStructureMemory(device.handle, 1, &bind),
                      "rtrBindAccelerationStructureMemory");
     }
@@ -158,7 +168,7 @@ RtcScene::RtcScene(const RtcDevice& device, const Scene& scene, bool fast_build)
     device.check(rtrCreateRecorder(device.handle, &recorderInfo, nullptr, &recorder), "rtrCreateRecorder");
     context.run([&](VkCommandBuffer commands) {
         device.check(rtrBeginRecorder(recorder, commands), "rtrBeginRecorder");
-        device.check(rtrCmdInitializeHeap(recorder, heap), "rtrCmdInitializeHeap");
+        if (heap) device.check(rtrCmdInitializeHeap(recorder, heap), "rtrCmdInitializeHeap");
         for (size_t i = 0; i < all.size(); ++i) {
             const bool is_top = i + 1 == all.size();
             device.check(rtrCmdBuildAccelerationStructure(recorder, &infos[i],
@@ -176,7 +186,7 @@ RtcScene::~RtcScene() {
     for (RtrAccelerationStructure structure : bottoms_)
         rtrDestroyAccelerationStructure(device_.handle, structure, nullptr);
     rtrDestroyAccelerationStructure(device_.handle, top, nullptr);
-    rtrDestroyHeap(device_.handle, heap, nullptr);
+    if (heap) rtrDestroyHeap(device_.handle, heap, nullptr);
 }
 
 VkDescriptorBufferInfo RtcScene::descriptor() const {

@@ -137,7 +137,7 @@ uint32_t compute_family(VkPhysicalDevice physical) {
     throw Error("the device has no compute queue");
 }
 
-// Every core feature the device has, in one chain that vkCreateDevice takes back.
+// Every core feature the device has, or only device addresses, in one chain that vkCreateDevice takes back.
 struct CoreFeatures {
     VkPhysicalDeviceVulkan13Features v13{};
     VkPhysicalDeviceVulkan12Features v12{};
@@ -149,7 +149,7 @@ struct CoreFeatures {
         v11.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES;
         v12.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES;
         v13.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES;
-        if (!all) return;
+        if (apiVersion < VK_API_VERSION_1_2 && !all) return;
         if (apiVersion >= VK_API_VERSION_1_2) {
             v10.pNext = &v11;
             v11.pNext = &v12;
@@ -160,6 +160,13 @@ struct CoreFeatures {
         v10.features.robustBufferAccess = VK_FALSE;
         v13.robustImageAccess = VK_FALSE;
         v12.bufferDeviceAddressCaptureReplay = VK_FALSE;
+        if (all) return;
+        // Nothing optional but addresses, which decide how acceleration structures are best reached.
+        const VkBool32 addresses = v12.bufferDeviceAddress;
+        v10 = {VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2};
+        v12 = {VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES};
+        v12.bufferDeviceAddress = addresses;
+        if (addresses) v10.pNext = &v12;
     }
 
     void append(void* more) {

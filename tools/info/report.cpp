@@ -57,8 +57,9 @@ RtrFloatProbe run_probe(const DeviceInfo& info) {
 }
 
 const char* yes_no(VkBool32 value) { return value ? "yes" : "no"; }
-const char* fetch_name(RtrFetch fetch) {
-    return fetch == RTR_FETCH_TEXEL ? "texel buffer" : "storage buffer";
+std::string fetch_name(const RtrPhysicalDeviceSupport& support) {
+    const std::string heap = support.recommended.fetch == RTR_FETCH_TEXEL ? "through a texel buffer" : "through a storage buffer";
+    return support.recommendAddresses ? "by device address (else " + heap + ")" : heap;
 }
 std::string mebibytes(VkDeviceSize bytes) { return std::to_string(bytes >> 20) + " MiB"; }
 
@@ -71,9 +72,7 @@ std::string limit_text(const RtrRequirement& requirement, uint64_t value) {
 
 std::string modes(const RtrPhysicalDeviceSupport& support) {
     if (!support.supported) return "none";
-    std::string text = support.heapMode ? "heap" : "";
-    if (support.addressMode) text += " (the device also has bufferDeviceAddress)";
-    return text;
+    return support.addressMode ? "heap, address" : "heap";
 }
 
 }  // namespace
@@ -120,7 +119,7 @@ std::string as_text(const DeviceReport& report) {
     if (!support.supported) return text.str();
 
     const RtrTraceOptions& options = support.recommended;
-    text << "  recommended:          nodes through " << fetch_name(options.fetch) << ", "
+    text << "  recommended:          nodes " << fetch_name(support) << ", "
          << (options.whileWhile ? "while-while" : "if-if") << " loop, "
          << (options.sharedStack ? std::to_string(options.sharedStack) + " stack entries in shared memory"
                                  : std::string("stack in a local array"))
@@ -182,6 +181,7 @@ std::string as_json(const std::vector<DeviceReport>& reports) {
         device["native_ray_tracing"] = report.native;
         device["needs_resumable_modules"] = support.needsResumableModules == VK_TRUE;
         device["recommended"] = {
+            {"addressing", support.recommendAddresses ? "address" : "heap"},
             {"fetch", support.recommended.fetch == RTR_FETCH_TEXEL ? "texel" : "storage"},
             {"while_while", support.recommended.whileWhile},
             {"shared_stack", support.recommended.sharedStack},

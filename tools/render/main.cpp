@@ -24,7 +24,7 @@ std::string joined(const std::vector<std::string>& words) {
 }
 
 struct Arguments {
-    std::string scene = "builtin:cornell", integrator = "path", dialect = "nv", device, output, demo_folder;
+    std::string scene = "builtin:cornell", integrator = "path", dialect = "nv", addressing, device, output, demo_folder;
     std::vector<float> eye, target;
     float field_of_view = 0, exposure = 1;
     std::string native, json;
@@ -163,6 +163,9 @@ int main(int argc, char** argv) {
     app.add_option("--dialect", arguments.dialect, "shaders to compile: nv or ext")
         ->capture_default_str()
         ->check(CLI::IsMember({"nv", "ext"}));
+    app.add_option("--addressing", arguments.addressing,
+                   "acceleration structures in a heap or by address (default: as the device recommends)")
+        ->check(CLI::IsMember({"heap", "address"}));
     app.add_option("--shaders", render.settings.shader_folder, "folder of the shaders (also RTC_SHADERS)");
     app.add_option("--module", render.modules,
                    "precompiled module, one for each pass, instead of the shaders");
@@ -193,6 +196,7 @@ int main(int argc, char** argv) {
         if (arguments.compare && arguments.native.empty()) throw Error("--compare needs --native=nv or khr");
         render.settings.integrator = integrator_from_name(arguments.integrator);
         render.settings.ext_dialect = arguments.dialect == "ext";
+        render.addressing = addressing_from_name(arguments.addressing);
         return draw(arguments);
     });
 }

@@ -31,6 +31,7 @@ std::vector<std::vector<uint32_t>> get_modules(const RtcDevice& device, const Re
     CompileOptions compile;
     compile.optimize = options.optimize;
     compile.resumable = device.support.needsResumableModules;
+    compile.addresses = device.by_address(options.addressing);
     for (const RayTracingJob& pass : job.passes) {
         const CompiledModule module = compile_job(pass.pipeline, compile);
         if (!module.warnings.empty()) std::fprintf(stderr, "%s", module.warnings.c_str());
@@ -62,9 +63,13 @@ void warn_of_holes(const Scene& scene) {
 
 RtcPasses::RtcPasses(const RtcDevice& device, const Scene& scene, const RenderJob& job,
                      const RenderOptions& options, RenderResult& result)
-    : context_(device.context), job_(job), structures_(device, scene, options.fast_build) {
-    const std::vector<std::vector<uint32_t>> modules =
-        get_modules(device, job, options, result.compile_seconds);
+    : RtcPasses(device, scene, job, options, result, get_modules(device, job, options, result.compile_seconds)) {}
+
+RtcPasses::RtcPasses(const RtcDevice& device, const Scene& scene, const RenderJob& job, const RenderOptions& options,
+                     RenderResult& result, const std::vector<std::vector<uint32_t>>& modules)
+    : context_(device.context),
+      job_(job),
+      structures_(device, scene, options.fast_build, is_address_module(modules[0])) {
     result.build_seconds = structures_.build_seconds;
     if (!options.quiet)
         std::printf(

@@ -17,6 +17,7 @@ struct RenderOptions {
     bool fast_build = false;
     bool quiet = false;
     bool optimize = true;
+    Addressing addressing = Addressing::Recommended;  // where modules are compiled
     bool keep_gbuffer = false;         // fill RenderResult::gbuffer
     std::vector<std::string> modules;  // precompiled, one a pass; empty: compile the shaders
     std::string save_modules;          // folder for what was compiled; empty: nowhere
@@ -39,6 +40,9 @@ class RtcPasses {
     uint32_t max_launches() const { return launchers_[0]->max_launches(); }
 
   private:
+    RtcPasses(const RtcDevice& device, const Scene& scene, const RenderJob& job, const RenderOptions& options,
+              RenderResult& result, const std::vector<std::vector<uint32_t>>& modules);
+
     const Context& context_;
     const RenderJob& job_;
     RtcScene structures_;

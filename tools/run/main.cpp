@@ -16,7 +16,7 @@ struct CommandLine {
     std::string scene, size, native_kind, device, case_file, push, table, suite, filter, json, save, oracle,
         save_oracle;
     double limit = 0;
-    std::string shard;
+    std::string shard, addressing;
     bool compare = false, validate = false, list = false, verbose = false, optimize = false, print = false;
     uint32_t recursion = 0, callable_depth = 0, repeats = 1, budget = 0, rounds = 0, timeout = 120;
     int resumable = -1, fetch = -1;
@@ -212,6 +212,7 @@ int run(const CommandLine& c) {
     rtc.step_budget = c.budget;
     rtc.rounds = c.rounds;
     rtc.fetch = c.fetch;
+    rtc.addressing = tools::addressing_from_name(c.addressing);
     rtc.save_module = c.save;
     if (!c.suite.empty()) {
         SuiteOptions suite;
@@ -326,7 +327,10 @@ int main(int argc, char** argv) {
     app.add_flag("-O", c.optimize, "let rtc optimise the module");
     app.add_option("--resumable", c.resumable,
                    "0 or 1: compile lanes that can suspend (default: as the device needs)");
-    app.add_option("--fetch", c.fetch, "acceleration structure through 0 texels, 1 a storage buffer");
+    app.add_option("--addressing", c.addressing,
+                   "acceleration structures in a heap or by address (default: as the device recommends)")
+        ->check(CLI::IsMember({"heap", "address"}));
+    app.add_option("--fetch", c.fetch, "a heap through 0 texels, 1 a storage buffer");
     app.add_option("--step-budget", c.budget, "loop turns before a lane suspends");
     app.add_option("--rounds", c.rounds, "how often suspended lanes may go on (64)")->check(CLI::Range(1, 16384));
     app.add_option("--save-module", c.save, "write the module rtc linked");

@@ -75,6 +75,7 @@ class RtcExecutor final : public Executor {
     RtcExecutor(RtcDevice& device, const RtcOptions& options)
         : context_(device.context), options_(options), said_(device.said), device_(device.handle) {
         said_.clear();
+        addresses_ = tools::by_address(context_, options.addressing, rtrGetDeviceSupport(device_)->recommendAddresses);
     }
 
     ~RtcExecutor() override {
@@ -92,7 +93,7 @@ class RtcExecutor final : public Executor {
     void build(const native::World& world) override {
         std::vector<std::unique_ptr<native::NvGeometries>> inputs;
         std::vector<VkAccelerationStructureInfoNV> infos;
-        VkDeviceSize heap_size = 4096, scratch_size = 256;
+        VkDeviceSize memory_size = 4096, scratch_size = 256;
         auto create = [&](const VkAccelerationStructureInfoNV& info,
                           std::vector<RtrAccelerationStructure>& out) {
             VkAccelerationStructureCreateInfoNV create_info{};
@@ -102,7 +103,7 @@ class RtcExecutor final : public Executor {
             need(rtrCreateAccelerationStructure(device_, &create_info, nullptr, &as),
                  "rtrCreateAccelerationStructure");
             out.push_back(as);
-            heap_size += size_of(as, VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_OBJECT_NV) + 256;
+            memory_size += size_of(as, VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_OBJECT_NV) + 256;
             scratch_size =
                 std::max(scratch_size,
                          size_of(as, VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_BUILD_SCRATCH_NV));
@@ -128,23 +129,7 @@ class RtcExecutor final : public Executor {
             infos.push_back(info);
             create(info, tops_);
         }
-        heap_buffer_ = Buffer(context_, heap_size, RTR_HEAP_BUFFER_USAGE, MemoryKind::Device);
-        RtrHeapCreateInfo heap_info{};
-        heap_info.buffer = heap_buffer_.handle;
-        heap_info.size = heap_size / 256 * 256;
-        need(rtrCreateHeap(device_, &heap_info, nullptr, &heap_), "rtrCreateHeap");
-        for (auto* list : {&bottoms_, &tops_})
-            for (RtrAccelerationStructure as : *list) {
-                RtrBindAccelerationStructureMemoryInfo bind{};
-                bind.accelerationStructure = as;
-                bind.heap = heap_;
-                need(rtrAllocateHeapRange(
-                         heap_, size_of(as, VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_OBJECT_NV), 0,
-                         &bind.heapOffset),
-                     "rtrAllocateHeapRange");
-                need(rtrBindAccelerationStructureMemory(device_, 1, &bind),
-                     "rtrBindAccelerationStructureMemory");
-            }
+        bind_memory(memory_size);
         Buffer scratch(context_, scratch_size, RTR_SCRATCH_BUFFER_USAGE, MemoryKind::Device);
         RtrRecorder recorder = nullptr;
         RtrRecorderCreateInfo recorder_info{};
@@ -153,7 +138,7 @@ class RtcExecutor final : public Executor {
                        VkBuffer instances, bool first) {
             context_.run([&](VkCommandBuffer commands) {
                 need(rtrBeginRecorder(recorder, commands), "rtrBeginRecorder");
-                if (first) need(rtrCmdInitializeHeap(recorder, heap_), "rtrCmdInitializeHeap");
+                if (first && heap_) need(rtrCmdInitializeHeap(recorder, heap_), "rtrCmdInitializeHeap");
                 need(rtrCmdBuildAccelerationStructure(recorder, &info, instances, 0, VK_FALSE, as, nullptr,
                                                       scratch.handle, 0),
                      "rtrCmdBuildAccelerationStructure");
@@ -223,7 +208,9 @@ class RtcExecutor final : public Executor {
 
     void write_top(VkDescriptorSet set, uint32_t binding, uint32_t element, uint32_t top) override {
         VkDescriptorBufferInfo info{};
-        if (top == ~0u)
+        if (top == ~0u && addresses_)
+            info = {null_top().handle, 0, RTC_AS_HEADER_QUADS * RTC_QUAD_BYTES};
+        else if (top == ~0u)
             need(rtrGetNullAccelerationStructureDescriptor(device_, heap_, &info),
                  "rtrGetNullAccelerationStructureDescriptor");
         else
@@ -254,7 +241,7 @@ class RtcExecutor final : public Executor {
                 scratch_ = Buffer(context_, scratch, RTR_LAUNCH_SCRATCH_BUFFER_USAGE, MemoryKind::Device);
         }
         need(rtrBeginRecorder(recorder_, commands), "rtrBeginRecorder");
-        need(rtrCmdSetHeap(recorder_, heap_), "rtrCmdSetHeap");
+        if (heap_) need(rtrCmdSetHeap(recorder_, heap_), "rtrCmdSetHeap");
         if (scratch_.handle)
             need(rtrCmdSetLaunchScratch(recorder_, scratch_.handle, 0, scratch_.size),
                  "rtrCmdSetLaunchScratch");
@@ -302,6 +289,43 @@ class RtcExecutor final : public Executor {
         throw Error(std::string(what) + ": " + tools::result_name(result) + said_);
     }
 
+    // Memory for all structures: a heap, or a buffer with an address.
+    void bind_memory(VkDeviceSize size) {
+        memory_ = Buffer(context_, size, addresses_ ? RTR_ADDRESS_BUFFER_USAGE : RTR_HEAP_BUFFER_USAGE,
+                         MemoryKind::Device);
+        if (!addresses_) {
+            RtrHeapCreateInfo info{};
+            info.buffer = memory_.handle;
+            info.size = size / 256 * 256;
+            need(rtrCreateHeap(device_, &info, nullptr, &heap_), "rtrCreateHeap");
+        }
+        VkDeviceSize used = 0;
+        for (auto* list : {&bottoms_, &tops_})
+            for (RtrAccelerationStructure as : *list) {
+                const VkDeviceSize bytes = size_of(as, VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_OBJECT_NV);
+                RtrBindAccelerationStructureMemoryInfo bind{};
+                bind.accelerationStructure = as;
+                if (addresses_) {
+                    bind.buffer = memory_.handle;
+                    bind.bufferOffset = used;
+                    used += (bytes + 255) / 256 * 256;
+                } else {
+                    bind.heap = heap_;
+                    need(rtrAllocateHeapRange(heap_, bytes, 0, &bind.heapOffset), "rtrAllocateHeapRange");
+                }
+                need(rtrBindAccelerationStructureMemory(device_, 1, &bind), "rtrBindAccelerationStructureMemory");
+            }
+    }
+
+    // A header of zeros: every ray misses it.
+    const Buffer& null_top() {
+        if (!null_top_.handle) {
+            null_top_ = Buffer(context_, RTC_AS_HEADER_QUADS * RTC_QUAD_BYTES, RTR_INPUT_BUFFER_USAGE, MemoryKind::Host);
+            std::memset(null_top_.mapped, 0, RTC_AS_HEADER_QUADS * RTC_QUAD_BYTES);
+        }
+        return null_top_;
+    }
+
     VkDeviceSize size_of(RtrAccelerationStructure as, VkAccelerationStructureMemoryRequirementsTypeNV type) {
         VkMemoryRequirements2 out{};
         out.sType = VK_STRUCTURE_TYPE_MEMORY_REQUIREMENTS_2;
@@ -318,6 +342,7 @@ class RtcExecutor final : public Executor {
         rtcc_options_set_optimization(
             options, options_.optimize ? RTCC_OPTIMIZATION_PERFORMANCE : RTCC_OPTIMIZATION_NONE);
         bool needed = rtrGetDeviceSupport(device_)->needsResumableModules;
+        rtcc_options_set_addressing(options, addresses_ ? RTCC_ADDRESSING_ADDRESS : RTCC_ADDRESSING_HEAP);
         rtcc_options_set_resumable(options, options_.resumable < 0 ? needed : options_.resumable);
         for (const tools::JobShader& shader : job.shaders) {
             int32_t stage = rtcc_pipeline_add_spirv(pipeline, stage_of(shader.stage), shader.name.c_str(),
@@ -353,7 +378,8 @@ class RtcExecutor final : public Executor {
     RtrPipeline pipeline_ = nullptr;
     RtrRecorder recorder_ = nullptr;
     std::vector<RtrAccelerationStructure> bottoms_, tops_;
-    Buffer heap_buffer_, table_buffer_, control_, scratch_;
+    bool addresses_ = false;
+    Buffer memory_, null_top_, table_buffer_, control_, scratch_;
     native::TableLayout table_;
     std::vector<uint32_t> module_;
     uint32_t group_count_ = 0;
@@ -381,6 +407,7 @@ RtcDevice::RtcDevice(const native::Context& c) : context(c) {
     info.device = context.device;
     info.pfnGetInstanceProcAddr = vkGetInstanceProcAddr;
     info.pMessenger = &messenger;
+    info.bufferDeviceAddress = context.device_addresses;
     VkResult result = rtrCreateDevice(&info, nullptr, &handle);
     if (result != VK_SUCCESS)
         throw Error(std::string("rtrCreateDevice: ") + tools::result_name(result) + said);

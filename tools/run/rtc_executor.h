@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "../native/executor.h"
+#include "addressing.h"
 
 struct RtrDevice_T;
 
@@ -18,6 +19,7 @@ struct RtcOptions {
     uint32_t step_budget = 0;  // loop turns before a lane suspends; 0: the device's default
     uint32_t rounds = 0;       // launches in which suspended lanes go on; 0: 64, the runtime's default
     int fetch = -1;            // 0 texels, 1 storage buffer; -1: as the device recommends
+    tools::Addressing addressing = tools::Addressing::Recommended;
     std::string save_module;   // writes the linked module there
     bool print_warnings = true;
 };

@@ -26,6 +26,9 @@ TEST(TraceVariantText, SetsWhatItNamesAndLeavesTheRestToTheDevice) {
     EXPECT_EQ(variant.options.workgroupSize, RTR_DEFAULT);
     EXPECT_TRUE(variant.fast_build);
     EXPECT_EQ(variant.resumable, 0);
+    EXPECT_EQ(variant.addressing, tools::Addressing::Recommended);
+    EXPECT_EQ(parse_variant("addressing=address").addressing, tools::Addressing::Address);
+    EXPECT_EQ(parse_variant("addressing=heap").addressing, tools::Addressing::Heap);
     EXPECT_EQ(parse_variant("").name, "rtc");
     EXPECT_EQ(parse_variant("name=a b,loop=if").name, "a b");
 }
@@ -33,6 +36,7 @@ TEST(TraceVariantText, SetsWhatItNamesAndLeavesTheRestToTheDevice) {
 TEST(TraceVariantText, ErrorsNameTheKeyAndWhatToWrite) {
     EXPECT_NE(error_of("fetsch=texel").find("fetch"), std::string::npos);
     EXPECT_NE(error_of("fetch=fast").find("storage"), std::string::npos);
+    EXPECT_NE(error_of("addressing=page").find("address"), std::string::npos);
     EXPECT_NE(error_of("stack=-1x").find("stack"), std::string::npos);
     EXPECT_NE(error_of("loop"), "");
 }

@@ -101,11 +101,32 @@ class Programs(unittest.TestCase):
                                 ("--compare needs --native", ["--compare"]), ("--classify needs", ["--classify", *out]),
                                 ("cannot read", ["--shaders", "/nowhere", *out]),
                                 ("1 module(s) were given", ["--module", "nowhere.spv", *out]),
+                                ("--addressing", ["--addressing", "page", *out]),
                                 ("--help lists", ["--colour", "red", *out])):
             os.makedirs(self.path("folder.png"), exist_ok=True)
             with self.subTest(arguments=arguments):
                 self.assertNotIn("tracing", self.fails(text, *arguments))
                 self.assertFalse(os.path.exists(self.path("a.png")), "a picture was drawn")
+
+    def test_heap_and_addresses_draw_the_same(self):
+        pictures = []
+        for addressing in ("heap", "address"):
+            path = self.path(addressing + ".pfm")
+            code, said, problem = run(RENDER, "--integrator", "ao", *SMALL[2:], "--addressing", addressing, "-o", path,
+                                      "--save-modules", self.path(addressing), RTC_VALIDATION="1")
+            if "has no bufferDeviceAddress" in problem:
+                self.skipTest(problem)
+            self.assertEqual(code, 0, problem)
+            with open(path, "rb") as file:
+                pictures.append(file.read())
+        self.assertEqual(*pictures)
+        # A module brings its addressing with it.
+        modules = [os.path.join(self.path("address"), name) for name in os.listdir(self.path("address"))]
+        self.assertEqual(len(modules), 1)
+        code, said, problem = run(RENDER, "--integrator", "ao", *SMALL[2:], "--module", modules[0], "-o", self.path("m.pfm"))
+        self.assertEqual(code, 0, problem)
+        with open(self.path("m.pfm"), "rb") as file:
+            self.assertEqual(file.read(), pictures[0])
 
     def test_native_ray_tracing_that_is_not_there(self):
         code, said, problem = run(RENDER, *SMALL, "--native", "nv", "-o", self.path("a.png"))
@@ -126,6 +147,10 @@ class Programs(unittest.TestCase):
         code, said, problem = run(INFO, "--json", "--no-probe")
         self.assertEqual(code, 0, problem)
         self.assertGreaterEqual(len(json.loads(said)), 1)
+        for device in json.loads(said)["devices"]:
+            cpu = "llvmpipe" in device["name"]
+            self.assertEqual(device["recommended"]["addressing"],
+                             "address" if device["buffer_device_address"] and not cpu else "heap")
         self.fails("there are:\n  0: ", "--device", "99", program=INFO)
         self.fails("extra", "extra", program=INFO)
 
