@@ -2,6 +2,7 @@
 """rtc-run itself: what it says about bad input, and that a wrong result is seen as one.   test_rtc_run.py RTC-RUN"""
 import json
 import os
+import struct
 import subprocess
 import sys
 import tempfile
@@ -64,8 +65,17 @@ class RtcRun(unittest.TestCase):
         for scene, text in (('{"meshes": [{"boxes": [1, 2]}]}', "six numbers"), ('{"mehses": []}', "unknown key"),
                             ('{"meshes": [{"triangles": [1]}]}', "nine numbers"),
                             ('{"meshes": [], "instances": [{"mesh": "x"}]}', "there is no mesh"),
-                            ('{"meshes": [{"vertices": [0,0,0], "indices": [0,0,9]}]}', "past the last vertex"), ("{", "parse error")):
+                            ('{"meshes": [{"vertices": [0,0,0], "indices": [0,0,9]}]}', "past the last vertex"),
+                            ('{"meshes": [\n  {"boxes": 1, ]}', "s.json:2:16: "), ("{", "s.json:1:2: ")):
             self.fails(text, *HELLO, "--scene", self.file("s.json", scene))
+
+    def test_bad_json_is_named_with_its_place(self):
+        bad = self.file("bad.json", '{\n  // a comment\n  "stages": [\n    nonsense ]\n}')
+        self.fails("bad.json:4:6: ", "--case", bad)
+        self.fails("bad.json:4:6: ", *HELLO, "--table", "@" + bad)
+        self.fails("key 'stages' not found", "--case", self.file("empty.json", "{}"))
+        code, said = run("--case", bad)
+        self.assertNotIn("json.exception", said)
 
     def test_native_ray_tracing_that_is_not_there(self):
         self.fails("VK_NV_ray_tracing", *HELLO, "--native", "nv")
@@ -130,6 +140,39 @@ class RtcRun(unittest.TestCase):
         with open(paths[4]) as file:
             self.assertEqual(len(json.load(file)) % 32, 0)
 
+    def test_values_from_files(self):
+        """Images of every kind, buffers, push constants and shader records, all filled from files."""
+        def floats(name, *values):
+            return self.file(name, struct.pack(f"{len(values)}f", *values))
+
+        def picture(name, *texels):  # one row
+            return self.file(name, b"PF\n%d 1\n-1.0\n" % len(texels) + b"".join(struct.pack("3f", *t) for t in texels))
+
+        shader = self.file("files.rgen", FILES)
+        faces = [picture(f"face{i}.pfm", (i, 0.5, 0.25)) for i in range(6)]
+        slices = [picture(f"slice{i}.pfm", (i, 1, 2), (i + 8, 3, 4)) for i in range(4)]
+        out = os.path.join(self.folder.name, "out.json")
+        given = {"0.0": {"file": picture("row.pfm", (1, 2, 3), (4, 5, 6)), "format": "rgba32f"},
+                 "0.1": {"files": slices, "format": "rgba32f"}, "0.2": {"files": faces, "format": "rgba32f"},
+                 "0.3": {"files": slices[1:3], "format": "rgba32f"},
+                 "0.4": {"file": self.file("raw.bin", bytes(range(2 * 2 * 2))), "size": [2, 2, 2], "format": "r8ui"},
+                 "0.5": {"file": floats("uniform.bin", 1.5, 2.5)}, "0.6": {"size": 4 * 64}}
+        binds = [word for slot, value in given.items() for word in ("--bind", slot + "=" + json.dumps(value))]
+        arguments = ["--size", "1x1", "--push", "file:" + floats("push.bin", 3.5, 4.5), *binds, "--table",
+                     json.dumps({"raygen": [{"group": "files.rgen", "data": {"file": floats("record.bin", 5.5, 6.5)}}]})]
+        code, said = run(shader, *arguments, "-o", "0.6=" + out)
+        self.assertEqual(code, 0, said)
+        with open(out) as file:
+            found = json.load(file)["r"]
+        self.assertEqual(found[:18], [4, 5, 3, 10, 0, 3, 5, 2, 9, 1, 0, 7, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5])
+        for slot, value, text in (("0.2", {"files": faces[:5]}, "six faces"), ("0.0", {"files": slices}, "one layer"),
+                                  ("0.3", {"files": [slices[0], given["0.0"]["file"] + "x"]}, "row.pfmx"),
+                                  ("0.3", {"files": [slices[0], faces[0]]}, "1x1, but"), ("0.3", {"files": []}, "a list"),
+                                  ("0.4", {"file": self.file("short.bin", b"abc"), "size": [2, 2, 2], "format": "r8ui"}, "8 bytes, 3"),
+                                  ("0.4", {"file": self.file("short.bin", b"abc")}, "how many texels")):
+            self.fails(text, shader, *arguments, "--bind", slot + "=" + json.dumps(value))
+        self.fails("more bytes than the shaders declare", shader, *arguments[:2], "--push", "file:" + shader)
+
     def test_ten_times_the_loop_iterations_lavapipe_has(self):
         """lavapipe 22.3 gives the loops of a group 65 535 iterations; these shaders need more than ten times that."""
         shaders = [self.file("long.rgen", LONG), self.file("long.rchit", LONG_HIT), self.file("long.rmiss", LONG_MISS)]
@@ -154,6 +197,28 @@ class RtcRun(unittest.TestCase):
         self.fails("--rounds allows more", *shaders, "--size", "16x1", "--bind", "0.1=" + json.dumps({"size": 128}),
                    "--rounds", "4", "--resumable", "1", "--step-budget", "4096")
 
+
+FILES = """#version 460
+#extension GL_NV_ray_tracing : require
+layout(set = 0, binding = 0) uniform sampler2D row;
+layout(set = 0, binding = 1) uniform sampler3D volume;
+layout(set = 0, binding = 2) uniform samplerCube cube;
+layout(set = 0, binding = 3) uniform sampler2DArray layers;
+layout(set = 0, binding = 4) uniform usampler3D raw;
+layout(set = 0, binding = 5) uniform Uniform { vec2 u; };
+layout(set = 0, binding = 6, std430) buffer Result { float r[]; };
+layout(push_constant) uniform Push { vec2 p; };
+layout(shaderRecordNV) buffer Record { vec2 s; };
+void main() {
+    vec4 a = texelFetch(row, ivec2(1, 0), 0), b = texelFetch(volume, ivec3(1, 0, 2), 0);
+    r[0] = a.x; r[1] = a.y;
+    r[2] = b.y; r[3] = b.x; r[4] = texelFetch(volume, ivec3(0), 0).x;
+    r[5] = textureLod(cube, vec3(0, -1, 0), 0.0).x; r[6] = textureLod(cube, vec3(0, 0, -1), 0.0).x;
+    r[7] = texelFetch(layers, ivec3(0, 0, 1), 0).x; r[8] = texelFetch(layers, ivec3(1, 0, 0), 0).x;
+    r[9] = float(textureSize(row, 0).y); r[10] = float(texelFetch(raw, ivec3(0), 0).x); r[11] = float(texelFetch(raw, ivec3(1), 0).x);
+    r[12] = u.x; r[13] = u.y; r[14] = p.x; r[15] = p.y; r[16] = s.x; r[17] = s.y;
+}
+"""
 
 LOOP, TRACES = 700_000, 20_000
 LONG = f"""#version 460

@@ -1,7 +1,9 @@
 // rtc-bench: measures what docs/benchmarks.md reports.
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 
+#include "command_line.h"
 #include "commands.h"
 
 int main(int argc, char** argv) {
@@ -13,11 +15,11 @@ int main(int argc, char** argv) {
     rtc::bench::add_specialise_command(app);
     rtc::bench::add_build_command(app);
 #endif
+    // Subcommands run while the line is parsed.
     try {
-        CLI11_PARSE(app, argc, argv);
+        return std::max(rtc::tools::parse_command_line(app, "rtc-bench", argc, argv), 0);
     } catch (const std::exception& error) {
         std::fprintf(stderr, "rtc-bench: error: %s\n", error.what());
         return 1;
     }
-    return 0;
 }

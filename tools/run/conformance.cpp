@@ -1,10 +1,10 @@
 // rtc-conformance: the conformance suite as one program. The cases are JSON files that the build generates from
 // tests/conformance/cases; running them is rtc-run's suite (suite.cpp).
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
 
 #include "backend.h"
+#include "command_line.h"
 
 namespace rtc::run {
 namespace {
@@ -56,7 +56,7 @@ int main(int argc, char** argv) {
     app.add_option("--timeout", suite.timeout_seconds, "seconds for one case (120)");
     app.add_flag("--validate", suite.host.validate, "run under the Khronos validation layer");
     app.add_flag("-v,--verbose", suite.verbose, "print cases that pass, and warnings");
-    CLI11_PARSE(app, argc, argv);
+    if (const int status = rtc::tools::parse_command_line(app, "rtc-conformance", argc, argv); status >= 0) return status;
     return rtc::tools::run_program("rtc-conformance", [&] {
         folder = rtc::run::find_cases_folder(argv[0], folder);
         if (list) return rtc::run::list(folder, pattern);

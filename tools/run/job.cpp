@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "files.h"
+
 namespace rtc::run {
 
 using tools::Error;
@@ -134,9 +136,9 @@ Job parse_case(const Json& json, const std::string& file) {
 
 Job load_case(const std::string& file) {
     try {
-        return parse_case(Json::parse(native::read_text(file), nullptr, true, true), file);
+        return parse_case(read_json(file), file);
     } catch (const Json::exception& e) {
-        throw Error(file + ": " + e.what());
+        throw Error(file + ": " + problem_of(e));
     }
 }
 
@@ -323,17 +325,18 @@ native::Tables make_tables(const Job& job, const AddressOf& address) {
                 record.group = group_index(json.value("group", Json()));
                 if (json.contains("data")) {
                     const Json& data = json["data"];
-                    if (is_sequence(data)) {
-                        record.data = sequence(data, address);
-                    } else {  // by the record block of the group's stages
-                        if (record.group == ~0u) throw Error("a null record can only hold raw data");
+                    TypeRef block;  // the record block of the group's stages
+                    if (record.group != ~0u) {
                         const JobGroup& group = groups[record.group];
-                        TypeRef block;
                         for (int s : {group.general, group.closest_hit, group.any_hit, group.intersection})
                             if (s >= 0 && job.modules[size_t(s)].record)
                                 block = job.modules[size_t(s)].record;
+                    }
+                    if (!raw_bytes(data, block ? block->size() : 0, address, record.data)) {
+                        if (record.group == ~0u) throw Error("a null record can only hold raw data");
                         if (!block)
-                            throw Error("no stage of group " + group.name + " declares a shader record");
+                            throw Error("no stage of group " + groups[record.group].name +
+                                        " declares a shader record");
                         record.data.resize(block->size());
                         write_typed(*block, data, record.data, 0, address);
                     }

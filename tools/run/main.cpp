@@ -4,6 +4,7 @@
 
 #include "command_line.h"
 #include "backend.h"
+#include "files.h"
 #include "report.h"
 
 namespace rtc::run {
@@ -45,7 +46,7 @@ Json value_spec(const std::string& text) {
         if (text.rfind("file:", 0) == 0) return {{"file", text.substr(5)}};
         if (text.rfind("json:", 0) == 0) return Json::parse(text.substr(5));
         if (text.rfind("@", 0) == 0)
-            return Json::parse(native::read_text(text.substr(1)), nullptr, true, true);
+            return read_json(text.substr(1));
         if (text.rfind("scene:", 0) == 0) return {{"scene", text.substr(6)}};
         if (text.rfind("pattern:", 0) == 0) {
             auto parts = split_all(text.substr(8), ',');

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "../common/scene.h"
+#include "files.h"
 #include "job.h"
 
 namespace rtc::run {
@@ -182,11 +183,11 @@ World parse_scene(const Json& json, const std::string& folder) {
 World load_scene(const std::string& path) {
     std::filesystem::path p(path);
     if (p.extension() == ".json") {
+        const Json json = read_json(path);
         try {
-            return parse_scene(Json::parse(native::read_text(path), nullptr, true, true),
-                               p.parent_path().string());
+            return parse_scene(json, p.parent_path().string());
         } catch (const Json::exception& e) {
-            throw Error(path + ": " + e.what());
+            throw Error(path + ": " + problem_of(e));
         } catch (const Error& e) {
             throw Error(path + ": " + e.what());
         }

@@ -5,8 +5,8 @@
 #include <cstring>
 #include <deque>
 
-#include "../common/image_file.h"
 #include "../common/resources.h"
+#include "files.h"
 
 namespace rtc::run {
 
@@ -153,7 +153,7 @@ class Session {
                 else
                     create_one(bound, spec);
             } catch (const Json::exception& e) {
-                throw Error("binding " + slot_name(slot) + ": " + e.what());
+                throw Error("binding " + slot_name(slot) + ": " + problem_of(e));
             } catch (const Error& e) {
                 throw Error("binding " + slot_name(slot) + ": " + e.what());
             }
@@ -282,31 +282,30 @@ class Session {
         desc.extent = storage ? VkExtent3D{job_.width, job_.height, job_.depth} : VkExtent3D{64, 64, 8};
         if (resource.image.dim == 3) desc.extent = {64, 64, 1};
         desc.layers = resource.image.arrayed ? 4 : 1;
-        tools::Picture picture;
-        bool from_file = spec.is_object() && spec.contains("file");
-        if (from_file) {
-            picture = tools::read_picture(spec["file"].get<std::string>(), spec.value("srgb", false));
-            desc.extent = {picture.width, picture.height, 1};
-        }
+        const bool cube = resource.image.dim == 3;
+        uint32_t pictures = 0;  // when there are several
+        Bytes texels;
+        const bool from_file =
+            file_texels(spec, bound.format, resource.image.dim == 2, desc.extent, pictures, texels);
+        if (pictures && !cube && !resource.image.arrayed)
+            throw Error(std::to_string(pictures) + " pictures for an image of one layer");
+        if (pictures && cube && pictures % 6)
+            throw Error(std::to_string(pictures) + " pictures for the six faces of cubes");
+        if (pictures) desc.layers = cube ? pictures / 6 : pictures;
         if (spec.is_object() && spec.contains("size")) {
             const Json& size = spec["size"];
             desc.extent = {size.at(0).get<uint32_t>(), size.size() > 1 ? size[1].get<uint32_t>() : 1,
                            size.size() > 2 ? size[2].get<uint32_t>() : 1};
         }
         if (spec.is_object()) desc.layers = spec.value("layers", desc.layers);
-        if (resource.image.dim == 3) desc.layers *= resource.image.arrayed && spec.contains("layers") ? 1 : 6;
+        if (cube) desc.layers *= resource.image.arrayed && spec.contains("layers") ? 1 : 6;
         if (resource.image.dim == 0) desc.extent.height = desc.extent.depth = 1;
         if (resource.image.dim == 1 || resource.image.dim == 3) desc.extent.depth = 1;
         desc.usage = storage ? VK_IMAGE_USAGE_STORAGE_BIT : VK_IMAGE_USAGE_SAMPLED_BIT;
         bound.image = std::make_unique<Image>(context_, desc);
         std::string pattern = spec.is_object() ? spec.value("pattern", storage ? "" : "checker") : "";
-        Bytes texels;
         if (from_file) {
-            std::vector<double> values;
-            for (size_t i = 0; i < size_t(picture.width) * picture.height; ++i)
-                for (uint32_t c = 0; c < bound.format.channels; ++c)
-                    values.push_back(c < picture.channels ? picture.pixels[i * picture.channels + c] : 1.0);
-            texels = encode_texels(values, bound.format);
+            // texels has them
         } else if (spec.is_object() && spec.contains("values")) {
             std::vector<double> values;
             for (const Json& value : spec["values"]) values.push_back(value.get<double>());
@@ -316,8 +315,8 @@ class Session {
         }
         size_t needed = size_t(desc.extent.width) * desc.extent.height * desc.extent.depth * desc.layers *
                         bound.format.channels * bound.format.channel_bytes;
-        if (texels.empty()) return;
-        if (from_file && texels.size() < needed)  // the same picture in every layer
+        if (texels.empty() && !from_file) return;
+        if (from_file && !pictures && !spec.contains("size"))  // the same picture in every layer
             while (texels.size() < needed)
                 texels.insert(texels.end(), texels.begin(),
                               texels.begin() + long(std::min(texels.size(), needed - texels.size())));
@@ -348,8 +347,8 @@ class Session {
         std::memset(mapped, 0, size);
         if (!spec.is_null() && !(spec.is_object() && spec.empty())) try {
                 Bytes bytes;
-                if (is_sequence(spec)) {
-                    bytes = sequence(spec, address);
+                if (raw_bytes(spec, size, address, bytes)) {
+                    // bytes has them
                 } else if (spec.is_object() && spec.contains("fill")) {
                     uint32_t word = uint32_t(number_bits(spec["fill"], Type::Kind::Uint, 32));
                     for (size_t at = 0; at + 4 <= size; at += 4) std::memcpy(mapped + at, &word, 4);
@@ -378,7 +377,7 @@ class Session {
                                 std::to_string(size));
                 if (!bytes.empty()) std::memcpy(mapped, bytes.data(), bytes.size());
             } catch (const Json::exception& e) {
-                throw Error("binding " + slot_name(bound.slot) + ": " + e.what());
+                throw Error("binding " + slot_name(bound.slot) + ": " + problem_of(e));
             } catch (const Error& e) {
                 throw Error("binding " + slot_name(bound.slot) + ": " + e.what());
             }
@@ -399,8 +398,7 @@ class Session {
         }
         bytes.resize((size + 3) / 4 * 4);
         AddressOf address = [this](const std::string& slot) { return address_of(slot); };
-        if (is_sequence(job_.push)) {
-            Bytes raw = sequence(job_.push, address);
+        if (Bytes raw; raw_bytes(job_.push, bytes.size(), address, raw)) {
             if (raw.size() > bytes.size()) throw Error("push constants: more bytes than the shaders declare");
             std::copy(raw.begin(), raw.end(), bytes.begin());
         } else if (!job_.push.is_null()) {

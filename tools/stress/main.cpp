@@ -1,10 +1,10 @@
 // rtc-stress: random scenes, changed and traced step after step, against an exact reference on the host.
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "command_line.h"
 #include "error.h"
 #include "world.h"
 
@@ -145,7 +145,7 @@ int main(int argc, char** argv) {
     app.add_option("--json", options.json, "write the counts there too");
     app.add_flag("--validate", options.validate, "under the validation layers, synchronisation included");
     app.add_flag("--quiet", options.quiet, "print the counts only");
-    CLI11_PARSE(app, argc, argv);
+    if (const int status = tools::parse_command_line(app, "rtc-stress", argc, argv); status >= 0) return status;
     options.limits.heap_bytes = options.heap_mb << 20;
     return tools::run_program("rtc-stress", [&] { return run(options); });
 }

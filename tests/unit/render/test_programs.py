@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""rtc-render and rtc-info as their users meet them: files they write, and what they say about mistakes.
+"""The programs as their users meet them: files they write, and what they say about mistakes.
 
-    test_programs.py RTC-RENDER RTC-INFO
+    test_programs.py RTC-RENDER RTC-INFO [OTHER-PROGRAM...]
 """
 import json
 import os
+import pty
 import struct
 import subprocess
 import sys
@@ -12,8 +13,8 @@ import tempfile
 import unittest
 import zlib
 
-INFO = sys.argv.pop(2)
-RENDER = sys.argv.pop(1)
+RENDER, INFO, *OTHERS = sys.argv[1:]
+del sys.argv[1:]
 SMALL = ["--integrator", "primary", "--width", "16", "--height", "12", "--samples", "1"]
 
 
@@ -73,6 +74,22 @@ class Programs(unittest.TestCase):
             self.assertEqual([file.readline() for _ in range(2)], [b"PF\n", b"16 12\n"])
         with open(self.path("größe ü.exr"), "rb") as file:
             self.assertEqual(file.read(4), b"\x76\x2f\x31\x01")
+
+    def test_a_terminal_sees_progress(self):
+        ours, theirs = pty.openpty()
+        drawing = subprocess.Popen([RENDER, *SMALL[:-1], "20", "-o", self.path("a.png")],
+                                   stdout=theirs, stdin=subprocess.DEVNULL)
+        os.close(theirs)
+        said = b""
+        try:
+            while piece := os.read(ours, 65536):
+                said += piece
+        except OSError:  # Linux's way of saying that the other end is closed
+            pass
+        os.close(ours)
+        self.assertEqual(drawing.wait(), 0)
+        self.assertRegex(said.decode(), r"\rtracing \[#+\.*\] +\d+ %  \d+\.\d\d Mrays/s")
+        self.assertRegex(said.decode(), r"\[#{30}\] 100 %")
 
     def test_scene_files(self):
         obj = self.path("a b.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
@@ -138,6 +155,14 @@ class Programs(unittest.TestCase):
         for program, arguments in ((RENDER, [*SMALL, "-o", self.path("a.png")]), (INFO, [])):
             self.fails("no Vulkan driver found", *arguments, program=program, VK_DRIVER_FILES="/nowhere",
                        VK_ICD_FILENAMES="/nowhere")
+
+    def test_unknown_words_are_told_by_every_program(self):
+        for program in (RENDER, INFO, *OTHERS):
+            with self.subTest(program=program):
+                self.fails("", "--colour", "red", program=program)
+                code, said, problem = run(program, "--help")
+                self.assertEqual((code, problem), (0, ""))
+                self.assertIn("Usage: ", said)
 
     def test_info(self):
         code, said, problem = run(INFO, "--device", "0")
