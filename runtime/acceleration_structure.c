@@ -189,6 +189,7 @@ void rtrDestroyAccelerationStructure(RtrDevice d, RtrAccelerationStructure as,
     const VkAllocationCallbacks* a = rtr_pick(d, allocator);
     if (!as) return;
     rtr_remove_live(as);
+    rtr_forget_built(as);
     rtr_free(a, as->geometries);
     rtr_free(a, as);
 }
@@ -203,7 +204,7 @@ void rtrGetAccelerationStructureMemoryRequirements(RtrDevice d,
         rtr_build_scratch(as->primitive_count, &layout);
         size = layout.total;
     } else if (type == VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_UPDATE_SCRATCH_NV) {
-        rtr_update_scratch(as->primitive_count, as->geometry_count, &layout);
+        rtr_update_scratch(as, &layout);
         size = layout.total;
     }
     out->memoryRequirements.size = rtr_align(size, RTC_AS_ALIGNMENT);

@@ -84,9 +84,7 @@ VkResult rtrCmdDeclareScene(RtrRecorder r, uint32_t count, const RtrAcceleration
     r->scene = scene;
     rtr_forget_declared(r);
     for (i = 0; r->device->validation && i < count; i++)
-        if (structures[i]->type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV &&
-            (result = rtr_add_checked(r, structures[i], i)) != VK_SUCCESS)
-            return result;
+        if ((result = rtr_add_checked(r, structures[i], i)) != VK_SUCCESS) return result;
     return VK_SUCCESS;
 }
 

@@ -23,13 +23,25 @@ void rtr_build_scratch(uint32_t n, RtrScratchLayout* l) {
     place(l, RTR_ARR_SLOT_OF, 4ull * n);
 }
 
-void rtr_update_scratch(uint32_t n, uint32_t geometries, RtrScratchLayout* l) {
-    (void)geometries;
+uint32_t rtr_most_nodes(const struct RtrAccelerationStructure_T* as) {
+    if (!as->compacted_size) return rtr_node_room(as->primitive_count);
+    return (uint32_t)(as->size / (RTC_NODE_QUADS * RTC_QUAD_BYTES));
+}
+
+/* Of a compacted structure only the size is known. */
+static uint32_t most_slots(const struct RtrAccelerationStructure_T* as) {
+    if (!as->compacted_size) return as->primitive_count;
+    return (uint32_t)(as->size / RTC_QUAD_BYTES /
+                      (as->type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV ? RTC_INSTANCE_QUADS : RTC_AABB_QUADS));
+}
+
+void rtr_update_scratch(const struct RtrAccelerationStructure_T* as, RtrScratchLayout* l) {
+    const uint32_t slots = most_slots(as), nodes = rtr_most_nodes(as);
     memset(l, 0, sizeof *l);
     place(l, RTR_ARR_STATE, 4 * RTR_ST_SUMS);
-    place(l, RTR_ARR_LEAF_BOX, 32ull * n);
-    place(l, RTR_ARR_LINKS, 4ull * rtr_node_room(n));
-    place(l, RTR_ARR_MARKS, 4ull * (n > rtr_node_room(n) ? n : rtr_node_room(n)));
+    place(l, RTR_ARR_LEAF_BOX, 32ull * slots);
+    place(l, RTR_ARR_LINKS, 4ull * nodes);
+    place(l, RTR_ARR_MARKS, 4ull * (slots > nodes ? slots : nodes));
 }
 
 VkResult rtr_bind_arrays(RtrBuild* b, uint32_t nodes_at, uint32_t slots_at) {
@@ -53,12 +65,13 @@ VkResult rtr_bind_arrays(RtrBuild* b, uint32_t nodes_at, uint32_t slots_at) {
             info->buffer = b->dst->buffer;
             info->offset =
                 base + RTC_QUAD_BYTES * (RTC_AS_HEADER_QUADS + (VkDeviceSize)RTC_NODE_QUADS * nodes_at);
-            info->range =
-                rtr_min_size(limit, base + RTC_QUAD_BYTES * (VkDeviceSize)b->slots_quad - info->offset);
+            info->range = rtr_min_size(
+                limit, (b->update ? end : base + RTC_QUAD_BYTES * (VkDeviceSize)b->slots_quad) - info->offset);
         } else if (i == RTR_ARR_DST_SLOTS) {
             info->buffer = b->dst->buffer;
             info->offset =
-                base + RTC_QUAD_BYTES * (b->slots_quad + (VkDeviceSize)rtr_slot_quads(b->dst) * slots_at);
+                base + RTC_QUAD_BYTES * (b->update ? slots_at
+                                                   : b->slots_quad + (VkDeviceSize)rtr_slot_quads(b->dst) * slots_at);
             if (info->offset >= end) continue; /* no slots at all */
             info->range = rtr_min_size(limit, end - info->offset);
         } else {
@@ -97,7 +110,7 @@ void rtr_dispatch(RtrBuild* b, RtrKernel kernel, uint64_t groups) {
     rtr_compute_barrier(b->recorder);
 }
 
-static VkResult emit_leaves(RtrBuild* b) {
+VkResult rtr_emit_leaves(RtrBuild* b) {
     RtrKernel kernel = RTR_KERNEL_leaf_triangles;
     if (b->push.flags & RTR_BUILD_AABBS) kernel = RTR_KERNEL_leaf_aabbs;
     if (b->push.flags & RTR_BUILD_TOP) {
@@ -161,7 +174,7 @@ static VkResult record_build(RtrBuild* b) {
     rtr_dispatch(b, RTR_KERNEL_init, 1);
     if ((b->push.flags & RTR_BUILD_TOP) && (r = rtr_check_build_instances(b, RTR_ARR_MARKS)) != VK_SUCCESS)
         return r;
-    if ((r = rtr_for_each_input(b, emit_leaves)) != VK_SUCCESS) return r;
+    if ((r = rtr_for_each_input(b, rtr_emit_leaves)) != VK_SUCCESS) return r;
     if (b->primitives) {
         rtr_dispatch(b, RTR_KERNEL_morton, groups);
         sort(b);
@@ -207,7 +220,7 @@ static VkResult check_build(RtrBuild* b, const VkAccelerationStructureInfoNV* in
     if (info->type != dst->type || info->flags != dst->flags)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "as-info",
                          "build: type or flags differ from dst's creation");
-    if (dst->compacted_size)
+    if (dst->compacted_size && !update)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "compacted-size",
                          "build: dst was created with compactedSize, for copies only");
     if (!b->scratch || b->scratch_offset % 256)
@@ -216,12 +229,12 @@ static VkResult check_build(RtrBuild* b, const VkAccelerationStructureInfoNV* in
     if (update && !(dst->flags & VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV))
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "update-not-allowed",
                          "update of a structure without ALLOW_UPDATE");
-    if (update && src &&
-        (src->type != dst->type || src->primitive_count != dst->primitive_count || !src->buffer))
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "update-src", "update: src does not match dst");
+    if (update && src && (src->type != dst->type || src->flags != dst->flags || !src->buffer))
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "update-src",
+                         "update: src is of another type, was created with other flags, or is not bound");
+    if (update && (r = rtr_check_update(src ? src : dst, info)) != VK_SUCCESS) return r;
     if (top) {
-        if (info->instanceCount > dst->instance_count ||
-            (update && info->instanceCount != dst->instance_count))
+        if (info->instanceCount > dst->instance_count && !dst->compacted_size)
             return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "as-counts",
                              "build of %u instances; created for %u", info->instanceCount,
                              dst->instance_count);
@@ -230,21 +243,19 @@ static VkResult check_build(RtrBuild* b, const VkAccelerationStructureInfoNV* in
                              "instanceData missing or instanceOffset not a multiple of 16");
         b->primitives = info->instanceCount;
     } else {
-        if (info->geometryCount > dst->geometry_count ||
-            (update && info->geometryCount != dst->geometry_count))
+        if (info->geometryCount > dst->geometry_count && !dst->compacted_size)
             return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "as-counts",
                              "build of %u geometries; created for %u", info->geometryCount,
                              dst->geometry_count);
         for (g = 0; g < info->geometryCount; g++) {
             uint32_t n = 0, made = 0;
             if ((r = rtr_check_geometry(d, &info->pGeometries[g], g, &n)) != VK_SUCCESS) return r;
-            rtr_check_geometry(d, &dst->geometries[g], g, &made);
-            if (info->pGeometries[g].geometryType != dst->geometries[g].geometryType || n > made ||
-                (update && info->pGeometries[g].flags != dst->geometries[g].flags))
-                return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "as-geometry",
-                                 "geometry %u: type, flags or count (%u) do not fit its creation (%u)", g, n,
-                                 made);
             total += n;
+            if (dst->compacted_size) continue;
+            rtr_check_geometry(d, &dst->geometries[g], g, &made);
+            if (info->pGeometries[g].geometryType != dst->geometries[g].geometryType || n > made)
+                return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "as-geometry",
+                                 "geometry %u: type or count (%u) do not fit its creation (%u)", g, n, made);
         }
         b->primitives = (uint32_t)total;
     }
@@ -256,8 +267,8 @@ static VkResult check_build(RtrBuild* b, const VkAccelerationStructureInfoNV* in
 }
 
 /* Launches of this recording look at what it built. */
-static VkResult remember_top(const RtrBuild* b) {
-    if (!b->device->validation || !(b->push.flags & RTR_BUILD_TOP) || !b->recorder->control) return VK_SUCCESS;
+static VkResult remember(const RtrBuild* b) {
+    if (!b->device->validation || !b->recorder->control) return VK_SUCCESS;
     return rtr_add_checked(b->recorder, b->dst, RTC_ERROR_BUILT);
 }
 
@@ -291,7 +302,10 @@ VkResult rtrCmdBuildAccelerationStructure(RtrRecorder recorder, const VkAccelera
     b.push.build_flags = info->flags;
     b.push.geometry_count = info->geometryCount;
     if (dst->type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV) b.push.flags |= RTR_BUILD_TOP;
-    if (dst->aabbs) b.push.flags |= RTR_BUILD_AABBS;
+    b.update = update;
+    if (update) b.push.flags |= RTR_BUILD_UPDATE;
+    if (info->geometryCount && info->pGeometries[0].geometryType == VK_GEOMETRY_TYPE_AABBS_NV)
+        b.push.flags |= RTR_BUILD_AABBS;
     if (info->flags & VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV)
         b.push.flags |= RTR_BUILD_KEEP_DEGENERATE;
     b.push.not_opaque = rtr_first_not_opaque(info);
@@ -299,11 +313,12 @@ VkResult rtrCmdBuildAccelerationStructure(RtrRecorder recorder, const VkAccelera
     b.push.facts = (dst->aabbs ? RTC_FACT_AABBS : 0u) | (opaque ? RTC_FACT_ALL_OPAQUE : 0u) |
                    (dst->heap ? 0u : RTC_FACT_ADDRESSES);
     if (update) {
-        rtr_update_scratch(dst->primitive_count, dst->geometry_count, &b.layout);
+        rtr_update_scratch(dst, &b.layout);
         r = rtr_record_update(&b, src);
-        return r == VK_SUCCESS ? remember_top(&b) : r;
+        return r == VK_SUCCESS ? remember(&b) : r;
     }
     rtr_build_scratch(dst->primitive_count, &b.layout);
     r = record_build(&b);
-    return r == VK_SUCCESS ? remember_top(&b) : r;
+    if (r == VK_SUCCESS) r = rtr_remember_built(dst, info);
+    return r == VK_SUCCESS ? remember(&b) : r;
 }

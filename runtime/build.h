@@ -19,6 +19,7 @@ typedef struct RtrBuild {
     uint32_t primitives; /* of this build: at most those of dst */
     uint32_t slots_quad;
     struct RtrBuildPush push;
+    bool update; /* DST_SLOTS is then a window of the whole structure, see kernels/refit.glsl */
     uint32_t node_window, slot_window; /* nodes, slots one binding reaches */
     VkDescriptorSet arrays;            /* bound now */
 } RtrBuild;
@@ -44,7 +45,8 @@ static inline uint32_t rtr_slot_word(const VkGeometryNV* g, uint32_t index) {
 /* How a vertex format is read; false when the extension does not list it. */
 bool rtr_vertex_format(VkFormat format, uint32_t* code, uint32_t* bytes, uint32_t* component_bytes);
 
-/* Set 1 with node window `nodes_at` and slot window `slots_at` (first node, first slot);
+/* Set 1 with node window `nodes_at` and slot window `slots_at` (first node, first slot; of an
+ * update the quad the window starts at);
  * arrays of size 0 in the layout are left out. */
 VkResult rtr_bind_arrays(RtrBuild* b, uint32_t nodes_at, uint32_t slots_at);
 void rtr_dispatch(RtrBuild* b, RtrKernel kernel, uint64_t groups);
@@ -68,6 +70,20 @@ void rtr_dispatch_kernel(RtrRecorder recorder, RtrKernel kernel, const struct Rt
  * from LEAF_BOX up to `end` are used meanwhile. */
 VkResult rtr_check_build_instances(RtrBuild* b, uint32_t end);
 
+/* What a structure is made of, as far as updates may not change it. */
+typedef struct RtrBuiltGeometry {
+    uint32_t type, flags, format, index_type, vertices, primitives, transform;
+} RtrBuiltGeometry;
+VkResult rtr_remember_built(RtrAccelerationStructure as, const VkAccelerationStructureInfoNV* info);
+void rtr_share_built(RtrAccelerationStructure dst, RtrAccelerationStructure src);
+void rtr_forget_built(RtrAccelerationStructure as);
+/* Whether an update of what `src` was built of may be this. */
+VkResult rtr_check_update(RtrAccelerationStructure src, const VkAccelerationStructureInfoNV* info);
+
+/* Boxes of the primitives of a piece of the input. */
+VkResult rtr_emit_leaves(RtrBuild* b);
+/* Nodes there may be in a structure, compacted or not. */
+uint32_t rtr_most_nodes(const struct RtrAccelerationStructure_T* as);
 VkResult rtr_record_update(RtrBuild* b, RtrAccelerationStructure src);
 
 #endif /* RTR_BUILD_H_ */

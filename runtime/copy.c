@@ -80,6 +80,7 @@ VkResult rtrCmdCopyAccelerationStructure(RtrRecorder rec, RtrAccelerationStructu
         if (at) rtr_compute_barrier(rec);
         rtr_dispatch_kernel(rec, dst->heap ? RTR_KERNEL_copy : RTR_KERNEL_copy_address, &push, rtr_groups(push.window_count, RTR_GROUP));
     }
+    rtr_share_built(dst, src);
     return VK_SUCCESS;
 }
 

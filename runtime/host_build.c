@@ -437,5 +437,5 @@ VkResult rtrBuildAccelerationStructureOnHost(RtrDevice d, const VkAccelerationSt
     put_slots(&b, dst->aabbs);
     put_header(&b, dst, &bounds, total);
     rtr_free(a, b.primitives);
-    return VK_SUCCESS;
+    return rtr_remember_built(dst, info);
 }

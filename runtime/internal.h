@@ -191,6 +191,7 @@ struct RtrAccelerationStructure_T {
     VkDeviceSize offset; /* in the buffer */
     RtrHeap heap;        /* NULL in address mode */
     uint64_t base;       /* the handle: quads from the heap's start, or a device address */
+    struct RtrBuilt* built; /* built.c; NULL: not known */
     struct RtrAccelerationStructure_T *live_next, *live_before; /* in RtrDevice_T::live */
 };
 
@@ -228,12 +229,12 @@ typedef struct RtrDeclaredScene {
     uint32_t not_opaque_geometry;
 } RtrDeclaredScene;
 
-/* A top level of the declared scene (its index there), or one that this recording built
+/* A structure of the declared scene (its index there), or one that this recording built
  * (RTC_ERROR_BUILT). */
-typedef struct RtrCheckedTop {
+typedef struct RtrChecked {
     RtrAccelerationStructure as;
     uint32_t index;
-} RtrCheckedTop;
+} RtrChecked;
 
 struct RtrRecorder_T {
     RtrDevice device;
@@ -255,8 +256,8 @@ struct RtrRecorder_T {
     uint32_t max_rounds;
     uint32_t stack_size; /* set by the application; 0: not set */
     RtrDeclaredScene scene;
-    /* With validation: top levels whose instances launches look at. */
-    struct RtrCheckedTop* checked;
+    /* With validation: structures whose headers and instances launches look at. */
+    struct RtrChecked* checked;
     uint32_t checked_count, checked_capacity;
     uint32_t set_call_count;
     RtrBoundSets set_calls[RTR_MAX_SET_CALLS];
@@ -340,7 +341,7 @@ typedef struct RtrScratchLayout {
     VkDeviceSize total;
 } RtrScratchLayout;
 void rtr_build_scratch(uint32_t primitives, RtrScratchLayout* layout);
-void rtr_update_scratch(uint32_t primitives, uint32_t geometries, RtrScratchLayout* layout);
+void rtr_update_scratch(const struct RtrAccelerationStructure_T* as, RtrScratchLayout* layout);
 
 static inline uint32_t rtr_slot_quads(const struct RtrAccelerationStructure_T* as) {
     if (as->type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV) return RTC_INSTANCE_QUADS;
@@ -394,7 +395,7 @@ void rtr_make_blob_version(const VkPhysicalDeviceIDProperties* id, uint8_t versi
 typedef struct RtrLaunchCheck {
     const RtrStridedBufferRegion* regions;  /* 4: raygen, miss, hit, callable */
     VkDescriptorBufferInfo params, control; /* slots of parameters; the control block */
-    VkDeviceSize table; /* RTR_CHECK_BYTES of the control buffer; not there without checked top levels */
+    VkDeviceSize table; /* RTR_CHECK_BYTES of the control buffer; not there without checked structures */
     uint32_t slots, slot_words;
     uint32_t identity;
 } RtrLaunchCheck;
@@ -405,8 +406,8 @@ VkResult rtr_validate_launch(RtrRecorder recorder, const RtrLaunchCheck* check);
 #define RTR_CHECK_BYTES 16384u /* of the control region: a piece of the table of live bottom levels */
 void rtr_add_live(RtrAccelerationStructure bottom);
 void rtr_remove_live(RtrAccelerationStructure bottom);
-/* From now on launches of this recorder look at the top level. */
-VkResult rtr_add_checked(RtrRecorder recorder, RtrAccelerationStructure top, uint32_t index);
+/* From now on launches of this recorder look at the structure. */
+VkResult rtr_add_checked(RtrRecorder recorder, RtrAccelerationStructure as, uint32_t index);
 /* Forgets those of the declared scene. */
 void rtr_forget_declared(RtrRecorder recorder);
 /* Records the checks of what the launch reaches. */

@@ -59,12 +59,27 @@ void rtrFormatLaunchError(const RtrLaunchError* e, char* text, size_t size) {
                      e->detail[1] & RTC_ERROR_RECORD_MASK,
                      k_regions[e->detail[1] >> RTC_ERROR_REGION_SHIFT & 3], e->detail[0]);
             break;
+        case RTC_LAUNCH_ERROR_BAD_UPDATE:
         case RTC_LAUNCH_ERROR_BAD_INSTANCE: {
             char which[96];
             if (e->detail[1] == RTC_ERROR_BUILT)
-                snprintf(which, sizeof which, "a top level that this recording built");
+                snprintf(which, sizeof which, "a structure that this recording built");
             else
                 snprintf(which, sizeof which, "structure %u of rtrCmdDeclareScene", e->detail[1]);
+            if (e->code == RTC_LAUNCH_ERROR_BAD_UPDATE) {
+                if (e->detail[0] == RTC_BAD_UPDATE_COUNTS)
+                    snprintf(what, sizeof what,
+                             "an update of %s had other counts than its build, or the build no ALLOW_UPDATE; "
+                             "it changed nothing",
+                             which);
+                else if (e->detail[0] == RTC_BAD_UPDATE_ACTIVE)
+                    snprintf(what, sizeof what, "an update of %s made inactive primitives active", which);
+                else
+                    snprintf(what, sizeof what,
+                             "an update of %s made its primitive or instance %u active or inactive", which,
+                             e->detail[0] - 1);
+                break;
+            }
             snprintf(what, sizeof what,
                      "instance %u of %s refers to no bottom level that is built and not destroyed", e->detail[0],
                      which);
@@ -93,6 +108,7 @@ void rtrFormatLaunchError(const RtrLaunchError* e, char* text, size_t size) {
     }
     if (e->code == RTC_LAUNCH_ERROR_NONE || e->code == RTC_LAUNCH_ERROR_UNFINISHED ||
         e->code == RTC_LAUNCH_ERROR_SBT_RANGE || e->code == RTC_LAUNCH_ERROR_BAD_INSTANCE ||
+        e->code == RTC_LAUNCH_ERROR_BAD_UPDATE ||
         (e->code == RTC_LAUNCH_ERROR_BAD_HANDLE && e->detail[1] & RTC_ERROR_RECORD)) {
         snprintf(text, size, "%s", what);
     } else {

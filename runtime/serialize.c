@@ -139,6 +139,7 @@ VkResult rtrCmdCopyMemoryToAccelerationStructure(RtrRecorder rec, RtrAcceleratio
         push.step = 1;
         rtr_dispatch_kernel(rec, kernel, &push, rtr_groups(push.window_count, RTR_GROUP));
     }
+    rtr_forget_built(dst);
     return VK_SUCCESS;
 }
 

@@ -175,21 +175,21 @@ VkResult rtr_check_build_instances(RtrBuild* b, uint32_t end) {
 
 /* ---- Before a launch ------------------------------------------------------------------------------ */
 
-VkResult rtr_add_checked(RtrRecorder r, RtrAccelerationStructure top, uint32_t index) {
+VkResult rtr_add_checked(RtrRecorder r, RtrAccelerationStructure as, uint32_t index) {
     uint32_t i;
     for (i = 0; i < r->checked_count; i++)
-        if (r->checked[i].as == top && r->checked[i].index == index) return VK_SUCCESS;
+        if (r->checked[i].as == as && r->checked[i].index == index) return VK_SUCCESS;
     if (r->checked_count == r->checked_capacity) {
         const VkAllocationCallbacks* a = r->has_allocator ? &r->allocator : NULL;
         const uint32_t capacity = r->checked_capacity ? 2 * r->checked_capacity : 8;
-        RtrCheckedTop* more = rtr_alloc(a, capacity * sizeof *more);
+        RtrChecked* more = rtr_alloc(a, capacity * sizeof *more);
         if (!more) return VK_ERROR_OUT_OF_HOST_MEMORY;
         if (r->checked_count) memcpy(more, r->checked, r->checked_count * sizeof *more);
         rtr_free(a, r->checked);
         r->checked = more;
         r->checked_capacity = capacity;
     }
-    r->checked[r->checked_count].as = top;
+    r->checked[r->checked_count].as = as;
     r->checked[r->checked_count++].index = index;
     return VK_SUCCESS;
 }
@@ -206,7 +206,7 @@ static VkResult look_at_records(Check* c) {
     const VkDeviceSize window = c->r->device->limits.maxStorageBufferRange / 256 * 256;
     VkDescriptorBufferInfo records = {top->buffer, 0, 0};
     VkDeviceSize at;
-    for (at = 0; at < top->size; at += window) {
+    for (at = 0; at < top->size && (!at || c->push.step == 1 + RTC_AS_KIND_TOP); at += window) {
         VkResult result;
         records.offset = top->offset + at;
         records.range = rtr_min_size(top->size - at, window);
@@ -221,7 +221,7 @@ static VkResult look_at_records(Check* c) {
 VkResult rtr_check_launch_instances(RtrRecorder r, const RtrLaunchCheck* check) {
     uint32_t i;
     for (i = 0; i < r->checked_count; i++) {
-        const RtrCheckedTop* t = &r->checked[i];
+        const RtrChecked* t = &r->checked[i];
         const uint64_t most = t->as->size / (RTC_INSTANCE_QUADS * RTC_QUAD_BYTES);
         Check c;
         VkResult result;
@@ -235,10 +235,11 @@ VkResult rtr_check_launch_instances(RtrRecorder r, const RtrLaunchCheck* check) 
         c.table.buffer = r->control;
         c.table.offset = check->table;
         c.table.range = RTR_CHECK_BYTES;
-        c.push.step = 1;
+        c.push.step = t->as->type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV ? 1 + RTC_AS_KIND_TOP
+                                                                                 : 1 + RTC_AS_KIND_BOTTOM;
         c.push.facts = 1;
         c.push.geometry = t->index;
-        c.push.count = (uint32_t)most;
+        c.push.count = c.push.step == 1 + RTC_AS_KIND_TOP ? (uint32_t)most : 1; /* of a bottom level the header */
         if ((result = look_through(&c)) != VK_SUCCESS) return result;
     }
     return VK_SUCCESS;

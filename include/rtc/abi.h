@@ -57,6 +57,9 @@
 #define RTC_HDR_OFFENDERS 24u /* 12 words, by the bit number of the fact: see RTC_OFFENDER_* */
 #define RTC_HDR_OFFENDERS_END 36u
 #define RTC_HDR_BAD_INSTANCE 36u /* top level: 1 + the first instance whose reference led to no structure; 0: none */
+#define RTC_HDR_BAD_UPDATE 37u /* 1 + the first primitive or instance that an update made active or inactive; 0: none; RTC_BAD_UPDATE_* */
+#define RTC_BAD_UPDATE_ACTIVE 0xffffffffu /* more or fewer are active than were; not known which */
+#define RTC_BAD_UPDATE_COUNTS 0xfffffffeu /* it was built with other counts, or without ALLOW_UPDATE: left as it was */
 
 /* A word of RTC_HDR_OFFENDERS in a top level: the first instance for which the fact does not
  * hold (for RTC_FACT_HAS_*: the first instance of that kind), and, where it is a geometry's
@@ -234,6 +237,7 @@
 #define RTC_LAUNCH_ERROR_STACK 7u /* internal: traversal or word stack overflow */
 #define RTC_LAUNCH_ERROR_SBT_RANGE 8u /* validation: an SBT region ends behind its buffer; detail: bytes there */
 #define RTC_LAUNCH_ERROR_BAD_INSTANCE 9u /* validation: detail: instance; detail2: structure of the declared scene, or RTC_ERROR_BUILT */
+#define RTC_LAUNCH_ERROR_BAD_UPDATE 10u /* validation: detail: RTC_HDR_BAD_UPDATE; detail2 as for BAD_INSTANCE */
 /* DETAIL2 of errors found in the table before the launch: this bit, the region (0 raygen, 1
  * miss, 2 hit, 3 callable), the record. */
 #define RTC_ERROR_RECORD 0x80000000u

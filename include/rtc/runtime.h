@@ -25,7 +25,8 @@
  * and a finished RtrPipeline, are immutable: any number of threads may use them.
  * RtrRecorder, RtrHeap and RtrAccelerationStructure are externally synchronised,
  * as VkCommandBuffer is; recording only reads heaps and acceleration structures
- * (except rtrBindAccelerationStructureMemory and the heap allocator).
+ * (except rtrBindAccelerationStructureMemory, the heap allocator, and what is recorded with a
+ * structure as its destination, which remembers what it is built of).
  *
  * Errors: VkResult, with a text through the messenger that names the argument or
  * limit, what it was and what was expected. VK_ERROR_VALIDATION_FAILED_EXT: an
@@ -159,7 +160,8 @@ typedef struct RtrDeviceCreateInfo {
      * in address mode without being followed. A launch traces nothing and has the launch error
      * BAD_INSTANCE, with the first such instance, when this happened in a top level that the same
      * recording built or that rtrCmdDeclareScene names; the latter's references are looked at
-     * again, for bottom levels that have been destroyed since. Scratch of top levels then needs
+     * again, for bottom levels that have been destroyed since. Updates that changed what is active are
+     * told of likewise (BAD_UPDATE). Scratch of top levels then needs
      * TRANSFER_DST, and launches more of the control region (rtrGetRecorderControlSize). */
     VkBool32 validation;
     /* What `device` was created with, read during this call: a pipeline whose module needs a
@@ -431,6 +433,14 @@ RTR_API VkResult rtrResetRecorder(RtrRecorder recorder);
  * (rtrTranslatePipelineStages/Access of the NV masks say the same).
  * PREFER_FAST_BUILD takes a Morton tree as it is; otherwise three passes of rotations bring
  * it near a SAH tree.
+ * An update may move vertices, boxes and instances, nothing else: geometries, their types,
+ * flags, formats and counts, and which primitives are active (for instances: a reference that is
+ * not 0, a transform that can be inverted) stay. It is compared with the build of `src` recorded
+ * last; of a deserialised structure the device compares the counts, and leaves it as it is when
+ * they differ. What became active or inactive stands in the header (RTC_HDR_BAD_UPDATE) and, with
+ * RtrDeviceCreateInfo::validation, makes the launch error BAD_UPDATE of launches of the same
+ * recording or of scenes declared. Compacted and deserialised structures can be updated when
+ * they were created with the flags of their source.
  * Errors: VALIDATION_FAILED (counts above those of creation, unbound objects, update
  * without ALLOW_UPDATE or with changed geometry, misaligned offsets);
  * FEATURE_NOT_PRESENT naming the device limit an input exceeds. */

@@ -52,6 +52,7 @@
 #define RTR_ST_ROOT 11u    /* inner node that is the root */
 #define RTR_ST_DEEP 12u    /* 1: deeper than RTC_MAX_DEPTH after rotating */
 #define RTR_ST_BAD_INSTANCE 13u /* first instance whose reference leads to no structure; ~0: none */
+#define RTR_ST_BAD_UPDATE 14u /* first primitive that an update made active or inactive; ~0: none */
 #define RTR_ST_OFFENDERS 16u /* 12: words of RTC_HDR_OFFENDERS */
 #define RTR_ST_SUMS 64u  /* block sums and histograms start here */
 
@@ -81,6 +82,8 @@
 #define RTR_BUILD_AABBS 2u
 #define RTR_BUILD_KEEP_DEGENERATE 4u /* ALLOW_UPDATE: only NaN drops a primitive */
 #define RTR_BUILD_HAS_TRANSFORM 16u
+#define RTR_BUILD_UPDATE 64u
+#define RTR_BUILD_COUNTED 128u /* an update that counted the active primitives */
 #define RTR_BUILD_CHECKED 32u /* check_instances left in MARKS whether a reference is good */
 
 struct RtrBuildPush {

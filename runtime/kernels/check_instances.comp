@@ -10,7 +10,7 @@
 // dispatch is about the references from (p.self_lo, p.self_hi) to (p.src_lo, p.src_hi).
 // Before a build (p.step 0) the records are instances, 64 bytes each from p.data_offset of
 // in_data on, and marks tells of each from p.first on whether it is good. Before a launch
-// (p.step 1) they are those of a top level whose header is in_transform, in_data starts
+// (p.step 1 + RTC_AS_KIND_*) they are those of a top level, or of a bottom level none, whose header is in_transform, in_data starts
 // p.window_first quads behind its base and ends p.window_count quads later; dst_header is the
 // control block, p.geometry what detail2 is to say, p.facts: look at the header too.
 #include "common.glsl"
@@ -48,12 +48,14 @@ void main() {
         at = (p.data_offset >> 2) + i * 16u + 14u;
     } else {
         if (i == 0u && p.facts != 0u) {
-            if (in_transform[RTC_HDR_MAGIC] != RTC_AS_MAGIC || in_transform[RTC_HDR_KIND] != RTC_AS_KIND_TOP)
+            if (in_transform[RTC_HDR_MAGIC] != RTC_AS_MAGIC || in_transform[RTC_HDR_KIND] != p.step - 1u)
                 report(RTC_LAUNCH_ERROR_ABI, in_transform[RTC_HDR_MAGIC], p.geometry);
             else if (in_transform[RTC_HDR_BAD_INSTANCE] != 0u)
                 report(RTC_LAUNCH_ERROR_BAD_INSTANCE, in_transform[RTC_HDR_BAD_INSTANCE] - 1u, p.geometry);
+            else if (in_transform[RTC_HDR_BAD_UPDATE] != 0u)
+                report(RTC_LAUNCH_ERROR_BAD_UPDATE, in_transform[RTC_HDR_BAD_UPDATE], p.geometry);
         }
-        if (i >= p.count || in_transform[RTC_HDR_MAGIC] != RTC_AS_MAGIC || i >= in_transform[RTC_HDR_SLOT_COUNT]) return;
+        if (i >= p.count || p.step != 1u + RTC_AS_KIND_TOP || in_transform[RTC_HDR_MAGIC] != RTC_AS_MAGIC || i >= in_transform[RTC_HDR_SLOT_COUNT]) return;
         uint quad = in_transform[RTC_HDR_SLOTS] + i * RTC_INSTANCE_QUADS + 6u;
         if (quad < p.window_first || quad - p.window_first >= p.window_count) return;
         at = (quad - p.window_first) * 4u;

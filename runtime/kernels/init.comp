@@ -13,5 +13,6 @@ void main() {
     }
     if (lane == 3u) state[RTR_ST_OFFENDER] = 0xffffffffu;
     if (lane == 4u) state[RTR_ST_BAD_INSTANCE] = 0xffffffffu;
+    if (lane == 5u) state[RTR_ST_BAD_UPDATE] = 0xffffffffu;
     if (lane >= RTR_ST_OFFENDERS && lane < RTR_ST_OFFENDERS + 12u) state[lane] = 0xffffffffu;
 }

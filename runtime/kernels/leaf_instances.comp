@@ -8,6 +8,7 @@
 #include "common.glsl"
 #include "leaf.glsl"
 #include "block.glsl"
+#include "refit.glsl"
 
 // ---- two-float arithmetic (Dekker 1971, Knuth): hi + lo, |lo| <= ulp(hi) / 2 ----
 // `precise` keeps drivers from rearranging it; fma() is not used because GLSL does not
@@ -105,6 +106,13 @@ void invert(vec4 m[3], out vec4 w[3]) {
 void main() {
     uint i = lane_index();
     bool in_range = i < p.count;
+    // The window of records starts at this dispatch's first instance; see refit.glsl for updates.
+    uint rec = i * RTC_INSTANCE_QUADS;
+    if ((p.flags & RTR_BUILD_UPDATE) != 0u) {
+        rec = dst_header[RTC_HDR_SLOTS] + (p.first + i) * RTC_INSTANCE_QUADS;
+        in_range = in_range && fits() && rec >= p.window_first && rec - p.window_first < p.window_count;
+        rec -= p.window_first;
+    }
     bool active_ = false;
     vec3 lo = vec3(0.0), hi = vec3(0.0);
     if (in_range) {
@@ -190,8 +198,8 @@ void main() {
             }
         }
 
-        // The window of records starts at this dispatch's first instance.
-        uint rec = i * RTC_INSTANCE_QUADS;
+        if ((p.flags & RTR_BUILD_UPDATE) != 0u && active_ != ((dst_slots[rec + 6u].x | dst_slots[rec + 6u].y) != 0u))
+            changed_activity(p.first + i);
         for (uint r = 0u; r < 3u; r++) {
             dst_slots[rec + r] = floatBitsToUint(w[r]);
             dst_slots[rec + 3u + r] = uvec4(in_data[at + 4u * r], in_data[at + 4u * r + 1u],

@@ -6,6 +6,7 @@
 #define RTR_COHERENT coherent
 #include "common.glsl"
 #include "facts.glsl"
+#include "refit.glsl"
 
 void leaf_child(uint node, uint side, uint ref) {
     uint count = (ref >> RTC_REF_COUNT_SHIFT) & RTC_REF_COUNT_MASK;
@@ -24,6 +25,10 @@ void leaf_child(uint node, uint side, uint ref) {
 void main() {
     uint i = lane_index();
     uint node = 0xffffffffu;
+    if (!fits()) {
+        if (i == 0u && dst_header[RTC_HDR_MAGIC] == RTC_AS_MAGIC) dst_header[RTC_HDR_BAD_UPDATE] = RTC_BAD_UPDATE_COUNTS;
+        return;
+    }
     if (i < dst_header[RTC_HDR_NODE_COUNT]) {
         uint left = dst_nodes[4u * i].w, right = dst_nodes[4u * i + 1u].w;
         if ((left & RTC_REF_LEAF) != 0u) leaf_child(i, 0u, left);
@@ -57,6 +62,9 @@ void main() {
                     dst_header[RTC_HDR_BOUNDS_MIN + k] = floatBitsToUint(lo[k]);
                     dst_header[RTC_HDR_BOUNDS_MAX + k] = floatBitsToUint(hi[k]);
                 }
+                bool recounted = (p.flags & RTR_BUILD_COUNTED) != 0u && state[RTR_ST_ACTIVE] != dst_header[RTC_HDR_ACTIVE_COUNT];
+                dst_header[RTC_HDR_BAD_UPDATE] = state[RTR_ST_BAD_UPDATE] != 0xffffffffu ? state[RTR_ST_BAD_UPDATE] + 1u :
+                                                 recounted ? RTC_BAD_UPDATE_ACTIVE : 0u;
                 if ((p.flags & RTR_BUILD_TOP) != 0u) {
                     uint n = dst_header[RTC_HDR_ACTIVE_COUNT];
                     dst_header[RTC_HDR_FACTS] = top_facts(n);

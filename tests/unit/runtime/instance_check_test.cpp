@@ -1,6 +1,7 @@
 // RtrDeviceCreateInfo::validation: references of instances that lead to no living bottom level
 // are never followed, and launches tell of them.
 #include <algorithm>
+#include <cmath>
 
 #include "launch_fixture.h"
 #include "module_util.h"
@@ -252,7 +253,7 @@ TEST_F(InstanceCheckTest, LaunchesTellOfThem) {
         EXPECT_EQ(e.detail[0], 1u);
         EXPECT_EQ(e.detail[1], RTC_ERROR_BUILT);
         EXPECT_FALSE(ran());
-        EXPECT_NE(said.find("that this recording built"), std::string::npos) << said;
+        EXPECT_NE(said.find("structure that this recording built"), std::string::npos) << said;
         // A later launch does not know of it, and the instance is inactive.
         scene.run([&] { record_launch(scene); });
         EXPECT_EQ(error(scene).code, RTC_LAUNCH_ERROR_NONE);
@@ -260,6 +261,28 @@ TEST_F(InstanceCheckTest, LaunchesTellOfThem) {
         data.as<VkAccelerationStructureInstanceNV>()[1] = scene.instance(one);
         EXPECT_EQ(build_and_launch().code, RTC_LAUNCH_ERROR_NONE) << said;
         EXPECT_TRUE(ran());
+
+        // An update that makes active what the build left out.
+        const VkBuildAccelerationStructureFlagsNV updatable = VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV;
+        const float nan = std::nanf("");
+        auto moving = scene.build_bottom({scene.triangles({{-1, -1, 1}, {1, -1, 1}, {0, 1, 1}, {nan, 0, 0}, {1, 0, 0}, {0, 1, 0}})}, updatable);
+        auto good = scene.triangles({{-1, -1, 1}, {1, -1, 1}, {0, 1, 1}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}});
+        VkAccelerationStructureInfoNV bottom{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV};
+        bottom.type = VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_NV;
+        bottom.flags = updatable;
+        bottom.geometryCount = 1;
+        bottom.pGeometries = &good;
+        scene.run([&] {
+            EXPECT_EQ(rtrCmdBuildAccelerationStructure(scene.recorder, &bottom, VK_NULL_HANDLE, 0, VK_TRUE, moving,
+                                                       nullptr, scratch.handle, 0),
+                      VK_SUCCESS);
+            record_launch(scene);
+        });
+        e = error(scene);
+        EXPECT_EQ(e.code, RTC_LAUNCH_ERROR_BAD_UPDATE);
+        EXPECT_EQ(e.detail[0], RTC_BAD_UPDATE_ACTIVE);
+        EXPECT_FALSE(ran());
+        EXPECT_NE(said.find("made inactive primitives active"), std::string::npos) << said;
 
         // A declared structure that nothing was built into.
         VkAccelerationStructureInfoNV empty = info;
