@@ -1,5 +1,5 @@
 // Tier `exact` against exact arithmetic, over the axes of the laboratory. Small
-// counts: rtc-accuracy --campaign exact repeats them with millions.
+// counts: rtc-accuracy agree repeats them with millions.
 #include <cmath>
 
 #include "cases.h"

@@ -9,7 +9,6 @@
 #include "cases.h"
 #include "error.h"
 #include "exact.h"
-#include "oracle.h"
 
 namespace rtc::lab {
 namespace {
@@ -227,72 +226,6 @@ void measure_exact(DeviceTracer& tracer, uint64_t rays, std::vector<ExactRow>& r
     rows.push_back(compare(tracer, "icosphere + 1e4", moved(sphere, 1, {1e4, -1e4, 5e3}), {1e4f, -1e4f, 5e3f},
                            1, rays, 14));
     rows.push_back(compare(tracer, "slivers 1e-4", make_slivers(256, 1e-4), {}, 0.02, rays, 15));
-}
-
-void measure_agreement(DeviceTracer& tracer, const std::string& axis, uint64_t total,
-                       std::vector<AgreementRow>& rows) {
-    constexpr uint64_t kBatch = 1 << 20;
-    const std::vector<ExactCase> cases = exact_cases(axis);
-    AgreementRow row{.axis = axis, .cases = cases.size()};
-    // Errors of t in steps of 1/64 ulp; more than 64 ulps share the last step but for the maximum.
-    std::vector<uint64_t> histogram(64 * 64 + 1);
-    for (const ExactCase& c : cases) {
-        const HostScene scene = build_scene(c.blases, c.instances, c.build);
-        tracer.set_scene(scene);
-        const Oracle oracle(scene);
-        const uint64_t share = (total + cases.size() - 1) / cases.size();
-        for (uint64_t first = 0; first < share; first += kBatch) {
-            std::vector<Ray> rays(std::min(kBatch, share - first));
-            in_parallel(rays.size(), [&](size_t begin, size_t end) {
-                const std::vector<Ray> part = c.rays(first + begin, end - begin);
-                std::copy(part.begin(), part.end(), rays.begin() + std::ptrdiff_t(begin));
-            });
-            const auto got = tracer.trace(rays);
-            const auto expected = first_hits(oracle, rays);
-            row.rays += rays.size();
-            for (size_t i = 0; i < rays.size(); ++i) {
-                const auto& e = expected[i];
-                const RayResult& g = got[i];
-                const bool hit = g.instance != kNoInstance;
-                row.hits += e.has_value();
-                row.ties += e && e->tied;
-                row.on_edge += e && e->on_edge;
-                const bool same = e && hit && g.instance == e->instance && g.geometry == e->geometry &&
-                                  g.primitive == e->primitive;
-                if (same) {
-                    if (c.denormal) continue;
-                    const double error = std::fabs(double(g.t) - e->t) / ulp(e->t);
-                    row.t_max = std::max(row.t_max, error);
-                    ++histogram[std::min<size_t>(size_t(error * 64), histogram.size() - 1)];
-                    continue;
-                }
-                if (!e && !hit) continue;
-                row.missed += e && !hit;
-                row.invented += !e && hit;
-                row.inverted += e && hit;
-                row.denormal += c.denormal;
-                if (c.denormal || !row.first.empty()) continue;
-                char text[400];
-                std::snprintf(text, sizeof text, "%s: o %a %a %a d %a %a %a t %a to %a", c.value.c_str(),
-                              rays[i].origin.x, rays[i].origin.y, rays[i].origin.z, rays[i].direction.x,
-                              rays[i].direction.y, rays[i].direction.z, rays[i].tmin, rays[i].tmax);
-                row.first = text;
-            }
-        }
-    }
-    uint64_t sum = 0, seen = 0;
-    for (uint64_t n : histogram) sum += n;
-    for (size_t i = 0; i < histogram.size(); ++i) {
-        const double upper = double(i + 1) / 64;
-        auto mark = [&](double& at, double p) {
-            if (double(seen) < p * double(sum) && double(seen + histogram[i]) >= p * double(sum)) at = upper;
-        };
-        mark(row.t_p50, 0.5);
-        mark(row.t_p99, 0.99);
-        mark(row.t_p999, 0.999);
-        seen += histogram[i];
-    }
-    rows.push_back(row);
 }
 
 void measure_cost(DeviceTracer& tracer, uint64_t rays, std::vector<CostRow>& rows) {

@@ -35,19 +35,6 @@ struct ExactRow {
     double t_p50 = 0, t_p99 = 0, t_p999 = 0, t_max = 0;  // error of t in ulps of the exact t
 };
 
-// First hits along one axis of cases.h against the oracle, all its cases together.
-struct AgreementRow {
-    std::string axis;
-    uint64_t cases = 0, rays = 0, hits = 0;
-    uint64_t missed = 0, invented = 0;  // hit by exact arithmetic only, by the device only
-    uint64_t inverted = 0;              // another triangle than the first
-    uint64_t denormal = 0;              // of all differences: in cases where denormals are at stake
-    uint64_t ties = 0, on_edge = 0;     // rays that only a rule decides
-    double t_p50 = 0, t_p99 = 0, t_p999 = 0, t_max = 0;  // ulps, cases without denormals
-    std::string first;                                   // the first difference, as hexadecimal floats
-    uint64_t different() const { return missed + invented + inverted; }
-};
-
 // Cost of the same binary: closest hits on a mesh of `triangles`.
 struct CostRow {
     std::string workload;
@@ -63,7 +50,6 @@ struct Report {
     std::vector<CullRow> culls;
     std::vector<ExactRow> exact;
     std::vector<CostRow> cost;
-    std::vector<AgreementRow> agreement;
 };
 
 // Names for --axes.
@@ -72,9 +58,6 @@ const std::vector<std::string>& axis_names();
 void measure_axis(DeviceTracer& tracer, const std::string& axis, uint64_t rays, std::vector<LeakRow>& rows);
 void measure_culls(DeviceTracer& tracer, uint64_t rays, std::vector<CullRow>& rows);
 void measure_exact(DeviceTracer& tracer, uint64_t rays, std::vector<ExactRow>& rows);
-// `rays` in all, in equal shares over the axis's cases.
-void measure_agreement(DeviceTracer& tracer, const std::string& axis, uint64_t rays,
-                       std::vector<AgreementRow>& rows);
 void measure_cost(DeviceTracer& tracer, uint64_t rays, std::vector<CostRow>& rows);
 
 }  // namespace rtc::lab

@@ -6,7 +6,6 @@
 #include <sstream>
 
 #include "command_line.h"
-#include "cases.h"
 #include "commands.h"
 #include "error.h"
 #include "experiments.h"
@@ -56,25 +55,6 @@ std::string markdown(const Report& report, const std::string& device) {
         }
         out << '\n';
     }
-    if (!report.agreement.empty()) {
-        out << "First hits against exact arithmetic, with the rules of tier exact. *Differ*: missed, invented, another "
-               "triangle; *of these* where denormals are at stake.\n\n"
-            << "| axis | cases | rays | hits | ties | on an edge | missed | invented | other | of these denormal | t p50 | "
-               "p99 | p99.9 | max |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
-        for (const AgreementRow& r : report.agreement) {
-            std::snprintf(line, sizeof line,
-                          "| %s | %llu | %llu | %llu | %llu | %llu | %llu | %llu | %llu | %llu | %.2f | %.2f | %.2f | %.3g |\n",
-                          r.axis.c_str(), (unsigned long long)r.cases, (unsigned long long)r.rays,
-                          (unsigned long long)r.hits, (unsigned long long)r.ties, (unsigned long long)r.on_edge,
-                          (unsigned long long)r.missed, (unsigned long long)r.invented,
-                          (unsigned long long)r.inverted, (unsigned long long)r.denormal, r.t_p50, r.t_p99,
-                          r.t_p999, r.t_max);
-            out << line;
-        }
-        out << '\n';
-        for (const AgreementRow& r : report.agreement)
-            if (!r.first.empty()) out << "- first difference, " << r.axis << ", " << r.first << '\n';
-    }
     if (!report.exact.empty()) {
         out << "First hits against exact arithmetic; t error in ulps of the exact t.\n\n"
             << "| scene | rays | hits | missed | invented | other triangle | exact ties | farthest from an "
@@ -120,23 +100,6 @@ nlohmann::ordered_json to_json(const Report& report) {
         json["culls"].push_back(
             {{"mesh", r.mesh}, {"place", r.place}, {"rays", r.rays}, {"culled", r.culls}});
     }
-    for (const AgreementRow& r : report.agreement) {
-        json["agreement"].push_back({{"axis", r.axis},
-                                     {"cases", r.cases},
-                                     {"rays", r.rays},
-                                     {"hits", r.hits},
-                                     {"ties", r.ties},
-                                     {"on_edge", r.on_edge},
-                                     {"missed", r.missed},
-                                     {"invented", r.invented},
-                                     {"other", r.inverted},
-                                     {"of_these_denormal", r.denormal},
-                                     {"t_ulp_p50", r.t_p50},
-                                     {"t_ulp_p99", r.t_p99},
-                                     {"t_ulp_p99_9", r.t_p999},
-                                     {"t_ulp_max", r.t_max},
-                                     {"first_difference", r.first}});
-    }
     for (const ExactRow& r : report.exact) {
         json["exact"].push_back({{"scene", r.scene},
                                  {"rays", r.rays},
@@ -170,13 +133,6 @@ bool verdict(const Report& report) {
                      (unsigned long long)broken);
         return false;
     }
-    uint64_t different = 0;
-    for (const AgreementRow& r : report.agreement) different += r.different() - r.denormal;
-    if ((report.variant == Variant::Exact || report.variant == Variant::Exact64) && different) {
-        std::fprintf(stderr, "rtc-accuracy: error: %s: %llu hits differ from exact arithmetic\n",
-                     variant_name(report.variant), (unsigned long long)different);
-        return false;
-    }
     if (report.variant == Variant::Contracted && !report.leaks.empty() && total == 0) {
         std::fprintf(stderr,
                      "rtc-accuracy: error: the negative control does not leak: this measurement is blind\n");
@@ -187,10 +143,11 @@ bool verdict(const Report& report) {
 
 int run(int argc, char** argv) {
     CLI::App app{"Measures leaks, exactness and cost of rtc's traversal on a device.\n"
-                 "rtc-accuracy leaks --help: campaigns whose rays the device makes."};
+                 "rtc-accuracy leaks --help: campaigns whose rays the device makes.\n"
+                 "rtc-accuracy agree --help: first hits against exact arithmetic."};
     std::vector<std::string> tiers = {"watertight"}, axes = {"mesh"};
     std::string device, json_path, markdown_path;
-    uint64_t rays = 1 << 17, exact_rays = 0, cost_rays = 0, cull_rays = 0, agreement_rays = 0;
+    uint64_t rays = 1 << 17, exact_rays = 0, cost_rays = 0, cull_rays = 0;
     bool validate = false, while_while = false, storage = false;
     uint32_t shared_stack = 0;
     app.add_option("--tier", tiers, "watertight, fast, exact, exact64, contracted (the negative control) or all")
@@ -201,8 +158,6 @@ int run(int argc, char** argv) {
     app.add_option("--rays", rays, "rays per point and aim");
     app.add_option("--culls", cull_rays, "rays per place for false box culls");
     app.add_option("--exact", exact_rays, "rays per scene against exact arithmetic");
-    app.add_option("--agreement", agreement_rays,
-                   "rays over all extremes, in equal shares, against the exact oracle");
     app.add_option("--cost", cost_rays, "rays per workload for timing");
     app.add_option("--json", json_path, "write all figures");
     app.add_option("--markdown", markdown_path, "write the tables");
@@ -249,16 +204,6 @@ int run(int argc, char** argv) {
         }
         for (const std::string& axis : axes) measure_axis(tracer, axis, rays, report.leaks);
         if (cull_rays) measure_culls(tracer, cull_rays, report.culls);
-        if (agreement_rays) {
-            // Exact decisions of a whole group can take more turns than lavapipe 22.3 allows a dispatch.
-            TracerOptions pausing = options;
-            pausing.step_budget = 6000;
-            pausing.pause = true;
-            DeviceTracer pausing_tracer(context, pausing);
-            const auto& names = exact_axis_names();
-            for (const std::string& axis : names)
-                measure_agreement(pausing_tracer, axis, agreement_rays / names.size(), report.agreement);
-        }
         if (exact_rays) measure_exact(tracer, exact_rays, report.exact);
         const std::string tables = markdown(report, name);
         std::fputs(tables.c_str(), stdout);
@@ -288,7 +233,9 @@ void rtc::lab::write_file(const std::string& path, const std::string& text) {
 
 int main(int argc, char** argv) {
     return rtc::tools::run_program("rtc-accuracy", [&] {
-        if (argc > 1 && std::string(argv[1]) == "leaks") return leaks_command(argc - 1, argv + 1);
+        const std::string command = argc > 1 ? argv[1] : "";
+        if (command == "leaks") return leaks_command(argc - 1, argv + 1);
+        if (command == "agree") return agree_command(argc - 1, argv + 1);
         return run(argc, argv);
     });
 }

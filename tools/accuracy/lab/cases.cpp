@@ -329,6 +329,40 @@ void add_build(std::vector<ExactCase>& cases) {
     cases.back().build.chain = 46;
 }
 
+// Everything at once: mesh, size, offset, transform, distance and speed drawn together. The powers of ten
+// stay where their products are normal floats.
+void add_mixed(std::vector<ExactCase>& cases) {
+    Random random(20);
+    auto power = [&](double low, double high) {
+        return std::pow(10.0, std::uniform_real_distribution<double>(low, high)(random));
+    };
+    for (int i = 0; i < 48; ++i) {
+        const IndexedMesh meshes[] = {spheroid(), knot(), make_slivers(128, power(-6, -1)), make_cube_grid(12),
+                                      make_mug(1)};
+        const IndexedMesh& mesh = meshes[random() % std::size(meshes)];
+        const double size = power(-9, 9), offset = random() & 1 ? size * power(0, 6) : 0, distance = power(0, 4);
+        const float by = float(power(-8, 8));
+        const auto& transforms = lab_transforms();
+        const auto& [name, transform] = transforms[random() % transforms.size()];
+        Instance instance;
+        instance.object_to_world = transform;
+        const Make aimed = plain(transform, distance);
+        char value[96];
+        std::snprintf(value, sizeof value, "%d: %s, size %.0e, offset %.0e, %s", i, mesh.name.c_str(), size, offset,
+                      name.c_str());
+        cases.push_back(mesh_case(
+            "mixed", value, moved(mesh, size, {offset, -offset, offset / 2}), point(offset, -offset, offset / 2),
+            1.6 * size,
+            [=](Shot& s) {
+                Ray ray = aimed(s);
+                ray.direction = {ray.direction.x * by, ray.direction.y * by, ray.direction.z * by};
+                ray.tmin = s.random() & 1 ? 0.0f : 0.5f / by;
+                return ray;
+            },
+            instance));
+    }
+}
+
 }  // namespace
 
 Transform rotation(double a, double b) {
@@ -389,7 +423,7 @@ const std::vector<std::pair<std::string, Transform>>& lab_transforms() {
 
 const std::vector<std::string>& exact_axis_names() {
     static const std::vector<std::string> names = {"offset",  "size", "aspect",   "distance",  "speed",      "zeros",
-                                                   "grazing", "aim",  "interval", "transform", "degenerate", "build"};
+                                                   "grazing", "aim",  "interval", "transform", "degenerate", "build", "mixed"};
     return names;
 }
 
@@ -397,7 +431,8 @@ std::vector<ExactCase> exact_cases(const std::string& axis) {
     std::vector<ExactCase> cases;
     void (*const adders[])(std::vector<ExactCase>&) = {add_offset,  add_size, add_aspect,   add_distance,
                                                        add_speed,   add_zeros, add_grazing, add_aim,
-                                                       add_interval, add_transform, add_degenerate, add_build};
+                                                       add_interval, add_transform, add_degenerate, add_build,
+                                                       add_mixed};
     const auto& names = exact_axis_names();
     const auto found = std::find(names.begin(), names.end(), axis);
     if (found == names.end()) {

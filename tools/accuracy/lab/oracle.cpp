@@ -7,9 +7,11 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <mutex>
 #include <thread>
 
+#include "integers.h"
 #include "rtc/abi.h"
 
 namespace rtc::lab {
@@ -36,7 +38,7 @@ mpq_class determinant(const Q& x, const Q& y, const Q& z) {
 struct LocalRay {
     V o, d;
     int axis = 2;
-    V turned_o, turned_d;
+    V turned_o, turned_d, inverse;
     double tmin = 0, tmax = 0;  // in units of the scaled direction
 
     static V turn(const V& v, int axis) { return {v[(axis + 1) % 3], v[(axis + 2) % 3], v[axis]}; }
@@ -45,6 +47,7 @@ struct LocalRay {
         axis = x > y ? (x > z ? 0 : 2) : (y > z ? 1 : 2);
         turned_o = turn(o, axis);
         turned_d = turn(d, axis);
+        for (int i = 0; i < 3; ++i) inverse[i] = 1 / d[i];
     }
 };
 
@@ -55,7 +58,10 @@ int direction_exponent(const Vec3& d) {
     return std::clamp(int(std::bit_cast<uint32_t>(largest) >> 23) - 127, -126, 126);
 }
 
-int exact_edge(const LocalRay& ray, const V& b, const V& c, bool* on_edge) {
+int exact_edge(const LocalRay& ray, const V& b, const V& c, bool* on_edge, OracleCounts& counts) {
+    if (const auto known = integer_edge(ray.turned_o, ray.turned_d, b, c, on_edge))
+        return ray.turned_d[2] < 0 ? -*known : *known;
+    ++counts.rationals;
     const Q d = rational(ray.turned_d), o = rational(ray.turned_o), qb = rational(b), qc = rational(c);
     int side = sgn(determinant(d, minus(qc, o), minus(qb, o)));
     if (side == 0) {
@@ -112,7 +118,7 @@ bool meets(const LocalRay& ray, const std::array<V, 3>& v, Hit& hit, bool* on_ed
     for (int i = 0; i < 3; ++i) {
         if (side[i] != 0) continue;
         ++counts.edges;
-        side[i] = exact_edge(ray, p[(i + 1) % 3], p[(i + 2) % 3], on_edge);
+        side[i] = exact_edge(ray, p[(i + 1) % 3], p[(i + 2) % 3], on_edge, counts);
         if (side[i] == 0) return false;
     }
     if (side[0] != side[1] || side[1] != side[2]) return false;
@@ -135,7 +141,12 @@ bool meets(const LocalRay& ray, const std::array<V, 3>& v, Hit& hit, bool* on_ed
         hit.t = above / below;
     } else {
         ++counts.orders;
-        hit.t = exact_t(ray, v).get_d();
+        if (const auto t = integer_t(ray.o, ray.d, v)) {
+            hit.t = t->value();
+        } else {
+            ++counts.rationals;
+            hit.t = exact_t(ray, v).get_d();
+        }
     }
     return true;
 }
@@ -144,6 +155,9 @@ bool meets(const LocalRay& ray, const std::array<V, 3>& v, Hit& hit, bool* on_ed
 int order(const Hit& a, double other, OracleCounts& counts) {
     if (!close(a.t, other) || !std::isfinite(other)) return a.t < other ? -1 : 1;
     ++counts.orders;
+    if (const auto t = integer_t(a.ray->o, a.ray->d, a.vertices))
+        if (const auto known = compare(*t, ratio_of(other))) return *known;
+    ++counts.rationals;
     return cmp(exact_t(*a.ray, a.vertices), mpq_class(other));
 }
 
@@ -151,23 +165,31 @@ int order(const Hit& a, const Hit& b, OracleCounts& counts) {
     if (!close(a.t, b.t)) return a.t < b.t ? -1 : 1;
     if (a.ray == b.ray && a.vertices == b.vertices) return 0;
     ++counts.orders;
+    const auto s = integer_t(a.ray->o, a.ray->d, a.vertices), t = integer_t(b.ray->o, b.ray->d, b.vertices);
+    if (s && t)
+        if (const auto known = compare(*s, *t)) return *known;
+    ++counts.rationals;
     return cmp(exact_t(*a.ray, a.vertices), exact_t(*b.ray, b.vertices));
 }
 
-bool box_met(const LocalRay& ray, const float* low, const float* high, double nearest) {
+// The t at which the ray enters the box, or infinity: it does not, or not before `nearest`.
+double box_entry(const LocalRay& ray, const uint32_t* box, double nearest) {
     double near = -INFINITY, far = INFINITY;
     for (int i = 0; i < 3; ++i) {
+        const double low = std::bit_cast<float>(box[i]), high = std::bit_cast<float>(box[4 + i]);
         if (ray.d[i] == 0) {
-            if (ray.o[i] < low[i] || ray.o[i] > high[i]) return false;
+            if (ray.o[i] < low || ray.o[i] > high) return INFINITY;
             continue;
         }
-        const double a = (low[i] - ray.o[i]) / ray.d[i], b = (high[i] - ray.o[i]) / ray.d[i];
+        const double a = (low - ray.o[i]) * ray.inverse[i], b = (high - ray.o[i]) * ray.inverse[i];
         near = std::max(near, std::min(a, b));
         far = std::min(far, std::max(a, b));
     }
+    // Three roundings of 2^-53 an entry, and what reciprocals of denormals may overflow to (NaN: enter).
     const double slack = 1e-12 * (std::fabs(near) + std::fabs(far)) + 1e-300;
-    return near <= far + slack && near - slack <= std::min(nearest, ray.tmax) * (1 + kTie) &&
-           far + slack >= ray.tmin;
+    const bool missed = near > far + slack || near - slack > std::min(nearest, ray.tmax) * (1 + kTie) ||
+                        far + slack < ray.tmin;
+    return missed ? INFINITY : (near < INFINITY ? near : std::numeric_limits<double>::max());
 }
 
 }  // namespace
@@ -210,13 +232,13 @@ std::optional<OracleHit> Oracle::first_hit(const Ray& ray, OracleCounts* counts_
             const uint32_t reference = stack[--depth];
             if (!(reference & RTC_REF_LEAF)) {
                 const uint32_t* node = nodes + size_t(reference) * RTC_NODE_QUADS * 4;
-                for (int c = 1; c >= 0; --c) {
-                    float box[8];
-                    for (int k = 0; k < 8; ++k) box[k] = std::bit_cast<float>(node[c * 8 + k]);
-                    const uint32_t child = node[3 + 4 * c];
-                    if (child == RTC_REF_EMPTY) continue;
-                    if (box_met(local, box, box + 4, best ? best_hit.t : INFINITY)) stack[depth++] = child;
-                }
+                const double nearest = best ? best_hit.t : INFINITY;
+                double entry[2];
+                for (int c = 0; c < 2; ++c)
+                    entry[c] = node[3 + 4 * c] == RTC_REF_EMPTY ? INFINITY : box_entry(local, node + c * 8, nearest);
+                const int first = entry[1] < entry[0];
+                if (entry[1 - first] < INFINITY) stack[depth++] = node[3 + 4 * (1 - first)];
+                if (entry[first] < INFINITY) stack[depth++] = node[3 + 4 * first];
                 continue;
             }
             const uint32_t count = (reference >> RTC_REF_COUNT_SHIFT) & RTC_REF_COUNT_MASK;
@@ -253,28 +275,25 @@ std::optional<OracleHit> Oracle::first_hit(const Ray& ray, OracleCounts* counts_
         best->t = std::ldexp(best_hit.t, -exponent);
         best->on_edge = on_edge;
     }
-    if (counts_out) {
-        counts_out->tests += counts.tests;
-        counts_out->edges += counts.edges;
-        counts_out->orders += counts.orders;
-    }
+    if (counts_out) counts_out->add(counts);
     return best;
 }
 
-void in_parallel(size_t count, const std::function<void(size_t, size_t)>& work) {
-    constexpr size_t kChunk = 4096;
+void in_parallel(size_t count, const std::function<void(size_t, size_t)>& work, unsigned wanted) {
+    constexpr size_t kChunk = 1024;
     std::atomic<size_t> next = 0;
     auto loop = [&] {
         for (size_t from; (from = next.fetch_add(kChunk)) < count;) work(from, std::min(count, from + kChunk));
     };
     std::vector<std::thread> threads;
-    for (unsigned i = 1; i < std::max(1u, std::thread::hardware_concurrency()); ++i) threads.emplace_back(loop);
+    const unsigned most = wanted ? wanted : std::max(1u, std::thread::hardware_concurrency());
+    for (unsigned i = 1; i < most && i * kChunk < count; ++i) threads.emplace_back(loop);
     loop();
     for (std::thread& thread : threads) thread.join();
 }
 
 std::vector<std::optional<OracleHit>> first_hits(const Oracle& oracle, const std::vector<Ray>& rays,
-                                                 OracleCounts* counts) {
+                                                 OracleCounts* counts, unsigned threads) {
     std::vector<std::optional<OracleHit>> hits(rays.size());
     std::mutex mutex;
     in_parallel(rays.size(), [&](size_t begin, size_t end) {
@@ -282,10 +301,8 @@ std::vector<std::optional<OracleHit>> first_hits(const Oracle& oracle, const std
         for (size_t i = begin; i < end; ++i) hits[i] = oracle.first_hit(rays[i], &mine);
         if (!counts) return;
         const std::lock_guard lock(mutex);
-        counts->tests += mine.tests;
-        counts->edges += mine.edges;
-        counts->orders += mine.orders;
-    });
+        counts->add(mine);
+    }, threads);
     return hits;
 }
 

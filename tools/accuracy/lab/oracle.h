@@ -21,9 +21,15 @@ struct OracleHit {
     bool on_edge = false; // the ray met an edge or vertex of some triangle exactly
 };
 
-// Decisions that needed rationals.
+// Triangle tests; what double could not prove, of edges and of orders; what 128-bit integers could not hold.
 struct OracleCounts {
-    uint64_t tests = 0, edges = 0, orders = 0;
+    uint64_t tests = 0, edges = 0, orders = 0, rationals = 0;
+    void add(const OracleCounts& more) {
+        tests += more.tests;
+        edges += more.edges;
+        orders += more.orders;
+        rationals += more.rationals;
+    }
 };
 
 class Oracle {
@@ -38,11 +44,11 @@ class Oracle {
     const HostScene& scene_;
 };
 
-// Calls work(begin, end) for parts of 0 .. count on all cores.
-void in_parallel(size_t count, const std::function<void(size_t begin, size_t end)>& work);
+// Calls work(begin, end) for parts of 0 .. count on `threads` threads, 0: as many as there are cores.
+void in_parallel(size_t count, const std::function<void(size_t begin, size_t end)>& work, unsigned threads = 0);
 
-// first_hit of all rays on all cores.
+// first_hit of all rays.
 std::vector<std::optional<OracleHit>> first_hits(const Oracle& oracle, const std::vector<Ray>& rays,
-                                                 OracleCounts* counts = nullptr);
+                                                 OracleCounts* counts = nullptr, unsigned threads = 0);
 
 }  // namespace rtc::lab

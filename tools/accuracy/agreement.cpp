@@ -1,0 +1,146 @@
+#include "agreement.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <future>
+#include <limits>
+
+#include "cases.h"
+
+namespace rtc::lab {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr uint64_t kBatch = 1 << 18;
+
+double seconds_since(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+double ulp(double t) {
+    const float f = std::fabs(float(t));
+    return double(std::nextafter(f, std::numeric_limits<float>::infinity())) - double(f);
+}
+
+// Errors in steps of 1/64 ulp; more than 64 ulps share the last step but for the maximum.
+class Histogram {
+  public:
+    void add(double error) {
+        ++steps_[std::min<size_t>(size_t(error * 64), steps_.size() - 1)];
+        ++count_;
+    }
+    double percentile(double p) const {
+        uint64_t seen = 0;
+        for (size_t i = 0; i < steps_.size(); ++i) {
+            seen += steps_[i];
+            if (seen > 0 && double(seen) >= p * double(count_)) return double(i + 1) / 64;
+        }
+        return 0;
+    }
+
+  private:
+    std::vector<uint64_t> steps_ = std::vector<uint64_t>(64 * 64 + 1);
+    uint64_t count_ = 0;
+};
+
+void compare(const ExactCase& c, const std::vector<Ray>& rays, const std::vector<RayResult>& got,
+             const std::vector<std::optional<OracleHit>>& expected, AgreementRow& row, Histogram& errors) {
+    row.rays += rays.size();
+    for (size_t i = 0; i < rays.size(); ++i) {
+        const auto& e = expected[i];
+        const RayResult& g = got[i];
+        const bool hit = g.instance != kNoInstance;
+        row.hits += e.has_value();
+        row.ties += e && e->tied;
+        row.on_edge += e && e->on_edge;
+        if (!e && !hit) continue;
+        if (e && hit && g.instance == e->instance && g.geometry == e->geometry && g.primitive == e->primitive) {
+            if (c.denormal) continue;
+            const double error = std::fabs(double(g.t) - e->t) / ulp(e->t);
+            row.t_max = std::max(row.t_max, error);
+            errors.add(error);
+            continue;
+        }
+        row.missed += e && !hit;
+        row.invented += !e && hit;
+        row.inverted += e && hit;
+        row.denormal += c.denormal;
+        if (c.denormal || !row.first.empty()) continue;
+        char text[400];
+        std::snprintf(text, sizeof text, "%s: o %a %a %a d %a %a %a t %a to %a", c.value.c_str(), rays[i].origin.x,
+                      rays[i].origin.y, rays[i].origin.z, rays[i].direction.x, rays[i].direction.y,
+                      rays[i].direction.z, rays[i].tmin, rays[i].tmax);
+        row.first = text;
+    }
+}
+
+// One case; `allowed` seconds at most, roughly.
+void measure_case(DeviceTracer& tracer, const ExactCase& c, uint64_t share, double allowed, unsigned threads,
+                  AgreementRow& row, Histogram& errors) {
+    const Clock::time_point start = Clock::now();
+    const HostScene scene = build_scene(c.blases, c.instances, c.build);
+    tracer.set_scene(scene);
+    const Oracle oracle(scene);
+    std::vector<Ray> rays;
+    for (uint64_t first = 0; first < share; first += kBatch) {
+        rays.resize(std::min(kBatch, share - first));
+        in_parallel(
+            rays.size(),
+            [&](size_t begin, size_t end) {
+                const std::vector<Ray> part = c.rays(first + begin, end - begin);
+                std::copy(part.begin(), part.end(), rays.begin() + std::ptrdiff_t(begin));
+            },
+            threads);
+        // The device works while the oracle does.
+        auto tracing = std::async(std::launch::async, [&] {
+            const Clock::time_point begin = Clock::now();
+            auto results = tracer.trace(rays);
+            row.device_seconds += seconds_since(begin);
+            return results;
+        });
+        const Clock::time_point begin = Clock::now();
+        const auto expected = first_hits(oracle, rays, &row.oracle, threads);
+        row.oracle_seconds += seconds_since(begin);
+        compare(c, rays, tracing.get(), expected, row, errors);
+        if (seconds_since(start) > allowed) break;
+    }
+}
+
+}  // namespace
+
+std::vector<AgreementRow> measure_agreement(DeviceTracer& tracer, const AgreementSettings& settings) {
+    const std::vector<std::string>& names = settings.axes.empty() ? exact_axis_names() : settings.axes;
+    const Clock::time_point start = Clock::now();
+    std::vector<AgreementRow> rows;
+    double said = 0;
+    for (size_t n = 0; n < names.size(); ++n) {
+        const std::vector<ExactCase> cases = exact_cases(names[n]);
+        AgreementRow row{.axis = names[n], .cases = cases.size()};
+        Histogram errors;
+        const uint64_t axis_share = settings.rays / names.size();
+        const uint64_t share = (axis_share + cases.size() - 1) / cases.size();
+        for (size_t i = 0; i < cases.size(); ++i) {
+            const double left = settings.seconds - seconds_since(start);
+            const double axis_parts = 1 - double(i) / double(cases.size()) + double(names.size() - n - 1);
+            const double allowed =
+                settings.seconds > 0 ? std::max(0.0, left) / axis_parts / double(cases.size()) : 1e30;
+            measure_case(tracer, cases[i], share, allowed, settings.threads, row, errors);
+            const double now = seconds_since(start);
+            if (!settings.quiet && now > said + 10) {
+                std::fprintf(stderr, "%s, case %zu of %zu: %.1f million rays of this axis, %llu differ, %.0f s\n",
+                             names[n].c_str(), i + 1, cases.size(), double(row.rays) * 1e-6,
+                             (unsigned long long)row.different(), now);
+                said = now;
+            }
+        }
+        row.t_p50 = errors.percentile(0.5);
+        row.t_p99 = errors.percentile(0.99);
+        row.t_p999 = errors.percentile(0.999);
+        rows.push_back(row);
+    }
+    return rows;
+}
+
+}  // namespace rtc::lab

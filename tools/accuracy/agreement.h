@@ -1,0 +1,39 @@
+// First hits on a device against exact arithmetic, over every axis of cases.h.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "device_tracer.h"
+#include "oracle.h"
+
+namespace rtc::lab {
+
+struct AgreementRow {
+    std::string axis;
+    uint64_t cases = 0, rays = 0, hits = 0;
+    uint64_t missed = 0, invented = 0;  // hit by exact arithmetic only, by the device only
+    uint64_t inverted = 0;              // another triangle than the first
+    uint64_t denormal = 0;              // of all differences: in cases where denormals are at stake
+    uint64_t ties = 0, on_edge = 0;     // rays that only a rule decides
+    double t_p50 = 0, t_p99 = 0, t_p999 = 0, t_max = 0;  // ulps, cases without denormals
+    std::string first;                                   // the first difference, as hexadecimal floats
+    OracleCounts oracle;                                 // what it needed rationals for
+    double device_seconds = 0, oracle_seconds = 0;       // wall time; both run at the same time
+    uint64_t different() const { return missed + invented + inverted; }
+};
+
+struct AgreementSettings {
+    uint64_t rays = 1'000'000;  // in all, in equal shares over the axes and within them over their cases
+    unsigned threads = 0;       // of the oracle; 0: all the machine has
+    double seconds = 0;         // cut every share so that the whole takes about this long; 0: no limit
+    bool quiet = false;
+    std::vector<std::string> axes;  // empty: all
+};
+
+// The tracer should pause (TracerOptions): exact decisions of a whole group can take more turns than
+// lavapipe 22.3 allows a dispatch.
+std::vector<AgreementRow> measure_agreement(DeviceTracer& tracer, const AgreementSettings& settings);
+
+}  // namespace rtc::lab
