@@ -119,12 +119,14 @@ class RtcTracer final : public CampaignTracer {
         if (subject == "fast") options.accuracy = RTCC_ACCURACY_FAST;
         if (subject == "exact") options.accuracy = RTCC_ACCURACY_EXACT;
         if (subject == "exact64") options.accuracy = RTCC_ACCURACY_EXACT_FLOAT64;
+        options.addresses = device_.by_address(tools::Addressing::Recommended);
+        addresses_ = options.addresses;
         module_ = tools::compile_job(launch_.job.pipeline, options).words;
         if (subject == "contracted") contract(module_);
     }
 
     void use(size_t point) override {
-        auto next = std::make_unique<tools::RtcScene>(device_, campaign_scene(points_[point]));
+        auto next = std::make_unique<tools::RtcScene>(device_, campaign_scene(points_[point]), false, addresses_);
         if (launcher_) {
             launcher_->use_scene(*next);
         } else {
@@ -149,6 +151,7 @@ class RtcTracer final : public CampaignTracer {
     Launch launch_;
     tools::RtcDevice device_;
     std::vector<uint32_t> module_;
+    bool addresses_ = false;
     std::unique_ptr<tools::RtcScene> scene_;
     std::unique_ptr<tools::RtcLauncher> launcher_;
 };
