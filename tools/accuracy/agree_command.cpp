@@ -119,8 +119,15 @@ int agree_command(int argc, char** argv) {
             std::printf("%s: skipped: the device has no shaderFloat64\n", tier.c_str());
             continue;
         }
-        DeviceTracer tracer(context, options);
-        const std::vector<AgreementRow> rows = measure_agreement(tracer, settings);
+        std::vector<AgreementRow> rows;
+        try {
+            DeviceTracer tracer(context, options);
+            rows = measure_agreement(tracer, settings);
+        } catch (const tools::Error& problem) {  // the others may still run
+            std::fprintf(stderr, "rtc-accuracy: error: %s: %s\n", tier.c_str(), problem.what());
+            good = false;
+            continue;
+        }
         const std::string tables = markdown(tier, name, rows);
         std::fputs(tables.c_str(), stdout);
         std::fflush(stdout);

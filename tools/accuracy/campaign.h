@@ -68,7 +68,6 @@ struct CampaignOffender {
     Vec3 origin, direction;
     uint32_t front = 0, back = 0;  // what the device counted
     ExactBalance exact;            // of the ray in object space, by the host's inverse
-    bool leak() const { return front + back < exact.front + exact.back; }
 };
 
 struct CampaignReport {
