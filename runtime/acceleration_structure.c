@@ -201,7 +201,7 @@ void rtrGetAccelerationStructureMemoryRequirements(RtrDevice d,
     VkDeviceSize size = as->size;
     (void)d;
     if (type == VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_BUILD_SCRATCH_NV) {
-        rtr_build_scratch(as->primitive_count, &layout);
+        rtr_build_scratch(as->primitive_count, as->geometry_count, &layout);
         size = layout.total;
     } else if (type == VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_UPDATE_SCRATCH_NV) {
         rtr_update_scratch(as, &layout);

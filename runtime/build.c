@@ -1,4 +1,6 @@
-/* rtrCmdBuildAccelerationStructure: which kernels run, in which order, on which arrays. */
+/* Builds and updates: scratch, checks, and several at once. */
+#include <stdlib.h>
+
 #include "build.h"
 
 static void place(RtrScratchLayout* l, uint32_t array, VkDeviceSize size) {
@@ -7,11 +9,15 @@ static void place(RtrScratchLayout* l, uint32_t array, VkDeviceSize size) {
     l->total += l->size[array];
 }
 
-void rtr_build_scratch(uint32_t n, RtrScratchLayout* l) {
+/* Words of ranges of indirect builds; a top level has one. */
+static VkDeviceSize range_words(uint32_t geometries) { return RTR_RANGE_WORDS * (VkDeviceSize)(geometries ? geometries : 1); }
+
+void rtr_build_scratch(uint32_t n, uint32_t geometries, RtrScratchLayout* l) {
     /* The scans of the numbering need two words for blocks of the same size. */
     VkDeviceSize sums = (VkDeviceSize)rtr_groups(n, RTR_SORT_BLOCK) * RTR_SORT_BINS;
     memset(l, 0, sizeof *l);
-    place(l, RTR_ARR_STATE, 4 * (RTR_ST_SUMS + sums));
+    l->ranges = (uint32_t)(RTR_ST_SUMS + sums);
+    place(l, RTR_ARR_STATE, 4 * (l->ranges + range_words(geometries)));
     place(l, RTR_ARR_LEAF_BOX, 32ull * n);
     place(l, RTR_ARR_NODE_BOX, 32ull * n);
     place(l, RTR_ARR_INFO, 16ull * n);
@@ -38,164 +44,12 @@ static uint32_t most_slots(const struct RtrAccelerationStructure_T* as) {
 void rtr_update_scratch(const struct RtrAccelerationStructure_T* as, RtrScratchLayout* l) {
     const uint32_t slots = most_slots(as), nodes = rtr_most_nodes(as);
     memset(l, 0, sizeof *l);
-    place(l, RTR_ARR_STATE, 4 * RTR_ST_SUMS);
+    l->ranges = RTR_ST_SUMS;
+    place(l, RTR_ARR_STATE,
+          4 * (RTR_ST_SUMS + range_words(as->compacted_size ? rtr_built_geometries(as) : as->geometry_count)));
     place(l, RTR_ARR_LEAF_BOX, 32ull * slots);
     place(l, RTR_ARR_LINKS, 4ull * nodes);
     place(l, RTR_ARR_MARKS, 4ull * (slots > nodes ? slots : nodes));
-}
-
-VkResult rtr_bind_arrays(RtrBuild* b, uint32_t nodes_at, uint32_t slots_at) {
-    RtrDevice d = b->device;
-    const VkDeviceSize limit = d->limits.maxStorageBufferRange;
-    const VkDeviceSize base = b->dst->offset;
-    const VkDeviceSize end = base + b->dst->size;
-    VkDescriptorBufferInfo infos[RTR_ARR_COUNT];
-    VkWriteDescriptorSet writes[RTR_ARR_COUNT];
-    uint32_t i, count = 0;
-    VkResult r = rtr_allocate_set(b->recorder, d->array_layout, &b->arrays);
-    if (r != VK_SUCCESS) return r;
-    memset(writes, 0, sizeof writes);
-    for (i = 0; i < RTR_ARR_COUNT; i++) {
-        VkDescriptorBufferInfo* info = &infos[i];
-        if (i == RTR_ARR_DST_HEADER) {
-            info->buffer = b->dst->buffer;
-            info->offset = base;
-            info->range = RTC_AS_HEADER_QUADS * RTC_QUAD_BYTES;
-        } else if (i == RTR_ARR_DST_NODES) {
-            info->buffer = b->dst->buffer;
-            info->offset =
-                base + RTC_QUAD_BYTES * (RTC_AS_HEADER_QUADS + (VkDeviceSize)RTC_NODE_QUADS * nodes_at);
-            info->range = rtr_min_size(
-                limit, (b->update ? end : base + RTC_QUAD_BYTES * (VkDeviceSize)b->slots_quad) - info->offset);
-        } else if (i == RTR_ARR_DST_SLOTS) {
-            info->buffer = b->dst->buffer;
-            info->offset =
-                base + RTC_QUAD_BYTES * (b->update ? slots_at
-                                                   : b->slots_quad + (VkDeviceSize)rtr_slot_quads(b->dst) * slots_at);
-            if (info->offset >= end) continue; /* no slots at all */
-            info->range = rtr_min_size(limit, end - info->offset);
-        } else {
-            if (!b->layout.size[i]) continue;
-            info->buffer = b->scratch;
-            info->offset = b->scratch_offset + b->layout.offset[i];
-            info->range = rtr_min_size(limit, b->layout.size[i]);
-        }
-        writes[count].sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
-        writes[count].dstSet = b->arrays;
-        writes[count].dstBinding = i;
-        writes[count].descriptorCount = 1;
-        writes[count].descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
-        writes[count].pBufferInfo = info;
-        count++;
-    }
-    d->vk.UpdateDescriptorSets(d->device, count, writes, 0, NULL);
-    d->vk.CmdBindDescriptorSets(b->recorder->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, d->kernel_layout, 1, 1,
-                                &b->arrays, 0, NULL);
-    return VK_SUCCESS;
-}
-
-static void set_kernel(RtrBuild* b, RtrKernel kernel) {
-    RtrDevice d = b->device;
-    d->vk.CmdBindPipeline(b->recorder->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, d->kernels[kernel]);
-    d->vk.CmdPushConstants(b->recorder->cmd, d->kernel_layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof b->push,
-                           &b->push);
-}
-
-/* Every dispatch is followed by a barrier: the steps of a build depend on each other. */
-void rtr_dispatch(RtrBuild* b, RtrKernel kernel, uint64_t groups) {
-    uint32_t x = groups < RTC_MAX_GROUPS_X ? (uint32_t)groups : RTC_MAX_GROUPS_X;
-    if (groups == 0) return;
-    set_kernel(b, kernel);
-    b->device->vk.CmdDispatch(b->recorder->cmd, x, rtr_groups(groups, RTC_MAX_GROUPS_X), 1);
-    rtr_compute_barrier(b->recorder);
-}
-
-VkResult rtr_emit_leaves(RtrBuild* b) {
-    RtrKernel kernel = RTR_KERNEL_leaf_triangles;
-    if (b->push.flags & RTR_BUILD_AABBS) kernel = RTR_KERNEL_leaf_aabbs;
-    if (b->push.flags & RTR_BUILD_TOP) {
-        /* The records go straight to their place; a piece of the input is one window of them. */
-        VkResult r = rtr_bind_arrays(b, 0, b->push.first);
-        if (r != VK_SUCCESS) return r;
-        b->push.window_first = b->push.first;
-        b->push.window_count = b->push.count;
-        rtr_dispatch(b, rtr_instance_kernel(b->dst), rtr_groups(b->push.count, RTR_GROUP));
-        return VK_SUCCESS;
-    }
-    rtr_dispatch(b, kernel, rtr_groups(b->push.count, RTR_GROUP));
-    return VK_SUCCESS;
-}
-
-static VkResult emit_slots(RtrBuild* b) {
-    rtr_dispatch(b, (b->push.flags & RTR_BUILD_AABBS) ? RTR_KERNEL_encode_aabbs : RTR_KERNEL_encode_triangles,
-                 rtr_groups(b->push.count, RTR_GROUP));
-    return VK_SUCCESS;
-}
-
-static void sort(RtrBuild* b) {
-    uint32_t shift;
-    b->push.blocks = rtr_groups(b->primitives, RTR_SORT_BLOCK);
-    for (shift = 0; shift < 32; shift += RTR_SORT_BITS) {
-        b->push.step = shift;
-        rtr_dispatch(b, RTR_KERNEL_sort_count, b->push.blocks);
-        rtr_dispatch(b, RTR_KERNEL_sort_scan, 1);
-        rtr_dispatch(b, RTR_KERNEL_sort_scatter, b->push.blocks);
-    }
-}
-
-/* Passes that rotate; more gain less than a percent each (kernels/lbvh_fit.comp). */
-#define ROTATION_PASSES 3u
-
-static void tree(RtrBuild* b) {
-    const uint32_t groups = rtr_groups(b->primitives, RTR_GROUP);
-    const uint32_t passes = (b->push.build_flags & VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_BUILD_BIT_NV)
-                                ? 1
-                                : ROTATION_PASSES;
-    uint32_t pass;
-    b->push.step = 0;
-    rtr_dispatch(b, RTR_KERNEL_lbvh_topology, groups);
-    b->push.step = passes > 1;
-    for (pass = 0; pass < passes; pass++) rtr_dispatch(b, RTR_KERNEL_lbvh_fit, groups);
-    if (passes > 1) { /* does nothing unless the tree has become too deep */
-        b->push.step = 2;
-        rtr_dispatch(b, RTR_KERNEL_lbvh_topology, groups);
-        rtr_dispatch(b, RTR_KERNEL_lbvh_fit, groups);
-    }
-    b->push.blocks = rtr_groups(b->primitives, RTR_SCAN_BLOCK);
-    rtr_dispatch(b, RTR_KERNEL_number_count, b->push.blocks);
-    rtr_dispatch(b, RTR_KERNEL_number_scan, 1);
-    rtr_dispatch(b, RTR_KERNEL_number, b->push.blocks);
-}
-
-static VkResult record_build(RtrBuild* b) {
-    uint32_t groups = rtr_groups(b->primitives, RTR_GROUP), at;
-    VkResult r = rtr_bind_arrays(b, 0, 0);
-    if (r != VK_SUCCESS) return r;
-    rtr_dispatch(b, RTR_KERNEL_init, 1);
-    if ((b->push.flags & RTR_BUILD_TOP) && (r = rtr_check_build_instances(b, RTR_ARR_MARKS)) != VK_SUCCESS)
-        return r;
-    if ((r = rtr_for_each_input(b, rtr_emit_leaves)) != VK_SUCCESS) return r;
-    if (b->primitives) {
-        rtr_dispatch(b, RTR_KERNEL_morton, groups);
-        sort(b);
-        tree(b);
-    }
-    for (at = 0; at < rtr_node_room(b->primitives); at += b->node_window) {
-        if ((r = rtr_bind_arrays(b, at, 0)) != VK_SUCCESS) return r;
-        b->push.window_first = at;
-        b->push.window_count = b->node_window;
-        rtr_dispatch(b, RTR_KERNEL_encode_nodes, groups ? groups : 1);
-    }
-    if (!(b->push.flags & RTR_BUILD_TOP)) {
-        for (at = 0; at < b->primitives; at += b->slot_window) {
-            if ((r = rtr_bind_arrays(b, 0, at)) != VK_SUCCESS) return r;
-            b->push.window_first = at;
-            b->push.window_count = b->slot_window;
-            if ((r = rtr_for_each_input(b, emit_slots)) != VK_SUCCESS) return r;
-        }
-    }
-    rtr_dispatch(b, RTR_KERNEL_header, 1);
-    return VK_SUCCESS;
 }
 
 static uint32_t window_of(RtrDevice d, uint32_t bytes_each) {
@@ -223,6 +77,10 @@ static VkResult check_build(RtrBuild* b, const VkAccelerationStructureInfoNV* in
     if (dst->compacted_size && !update)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "compacted-size",
                          "build: dst was created with compactedSize, for copies only");
+    if (b->indirect && (b->indirect_offset % 4 || b->indirect_stride % 4 ||
+                        (b->indirect_stride < 16 && info->geometryCount > 1)))
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "indirect-build",
+                         "build: indirectOffset and indirectStride must be multiples of 4, the stride at least 16");
     if (!b->scratch || b->scratch_offset % 256)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "scratch",
                          "build: scratch buffer missing or scratchOffset not a multiple of 256");
@@ -266,59 +124,164 @@ static VkResult check_build(RtrBuild* b, const VkAccelerationStructureInfoNV* in
     return VK_SUCCESS;
 }
 
+/* Fills in what recording needs. */
+static VkResult prepare(RtrBuild* b, RtrRecorder recorder, const RtrAccelerationStructureBuildInfo* given) {
+    const VkAccelerationStructureInfoNV* info = given->pInfo;
+    const RtrAccelerationStructure dst = given->dst;
+    bool opaque;
+    VkResult r;
+    b->recorder = recorder;
+    b->device = recorder->device;
+    b->dst = dst;
+    b->src = given->src;
+    b->info = info;
+    b->update = given->update;
+    b->scratch = given->scratch;
+    b->scratch_offset = given->scratchOffset;
+    b->instance_data = given->instanceData;
+    b->instance_offset = given->instanceOffset;
+    b->indirect = given->indirectBuffer;
+    b->indirect_offset = given->indirectOffset;
+    b->indirect_stride = given->indirectStride;
+    if ((r = rtr_check_chain(b->device, "RtrAccelerationStructureBuildInfo", given->pNext)) != VK_SUCCESS ||
+        (r = check_build(b, info, given->update, given->src)) != VK_SUCCESS)
+        return r;
+    b->geometries = info->pGeometries;
+    b->geometry_count = info->geometryCount;
+    b->slots_quad = rtr_slots_quad(dst->primitive_count);
+    b->node_window = window_of(b->device, RTC_NODE_QUADS * RTC_QUAD_BYTES);
+    b->slot_window = window_of(b->device, rtr_slot_quads(dst) * RTC_QUAD_BYTES);
+    b->push.total = b->primitives;
+    b->push.self_lo = (uint32_t)dst->base;
+    b->push.self_hi = (uint32_t)(dst->base >> 32);
+    b->push.slots_quad = b->slots_quad;
+    b->push.heap_quads = dst->heap ? (uint32_t)(dst->heap->size / RTC_QUAD_BYTES) : 0;
+    b->push.slot_quads = rtr_slot_quads(dst);
+    b->push.build_flags = info->flags;
+    b->push.geometry_count = info->geometryCount;
+    if (dst->type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV) b->push.flags |= RTR_BUILD_TOP;
+    if (b->update) b->push.flags |= RTR_BUILD_UPDATE;
+    if (info->geometryCount && info->pGeometries[0].geometryType == VK_GEOMETRY_TYPE_AABBS_NV)
+        b->push.flags |= RTR_BUILD_AABBS;
+    if (info->flags & VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV)
+        b->push.flags |= RTR_BUILD_KEEP_DEGENERATE;
+    b->push.not_opaque = rtr_first_not_opaque(info);
+    opaque = b->push.not_opaque == 0xffffffffu;
+    b->push.facts = (b->push.flags & RTR_BUILD_AABBS ? RTC_FACT_AABBS : 0u) | (opaque ? RTC_FACT_ALL_OPAQUE : 0u) |
+                    (dst->heap ? 0u : RTC_FACT_ADDRESSES);
+    if (b->update)
+        rtr_update_scratch(dst, &b->layout);
+    else
+        rtr_build_scratch(dst->primitive_count, dst->geometry_count, &b->layout);
+    if (b->indirect && 4 * (b->layout.ranges + range_words(info->geometryCount)) > b->layout.size[RTR_ARR_STATE])
+        return rtr_error(b->device, VK_ERROR_FEATURE_NOT_PRESENT, "indirect-build",
+                         "indirect update of %u geometries of a structure that the host knows nothing of",
+                         info->geometryCount);
+    if (b->update) return rtr_check_update_reach(b);
+    return VK_SUCCESS;
+}
+
+/* ---- Several at once ------------------------------------------------------------------------- */
+
+/* What a build writes: scratch or its destination. */
+typedef struct Span {
+    uint64_t buffer;
+    VkDeviceSize begin, end;
+    uint32_t build;
+    bool scratch;
+} Span;
+
+static int by_place(const void* a, const void* b) {
+    const Span *x = a, *y = b;
+    if (x->buffer != y->buffer) return x->buffer < y->buffer ? -1 : 1;
+    return x->begin < y->begin ? -1 : x->begin > y->begin;
+}
+
+static VkResult check_overlap(RtrRecorder r, const RtrBuild* builds, uint32_t count) {
+    const VkAllocationCallbacks* a = r->has_allocator ? &r->allocator : NULL;
+    Span* spans = rtr_alloc(a, 2 * (size_t)count * sizeof *spans);
+    VkResult result = VK_SUCCESS;
+    uint32_t i;
+    if (!spans) return VK_ERROR_OUT_OF_HOST_MEMORY;
+    for (i = 0; i < count; i++) {
+        const RtrBuild* b = &builds[i];
+        spans[2 * i] = (Span){(uint64_t)b->scratch, b->scratch_offset, b->scratch_offset + b->layout.total, i, true};
+        spans[2 * i + 1] =
+            (Span){(uint64_t)b->dst->buffer, b->dst->offset, b->dst->offset + b->dst->size, i, false};
+    }
+    qsort(spans, 2 * (size_t)count, sizeof *spans, by_place);
+    for (i = 1; i < 2 * count && result == VK_SUCCESS; i++) {
+        const Span *x = &spans[i - 1], *y = &spans[i];
+        if (x->buffer != y->buffer || y->begin >= x->end) continue;
+        result = rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "batch-overlap",
+                           "builds of one call: the %s of number %u and the %s of number %u share memory",
+                           x->scratch ? "scratch" : "dst", x->build, y->scratch ? "scratch" : "dst", y->build);
+    }
+    rtr_free(a, spans);
+    return result;
+}
+
+/* A phase of all of them, one barrier, the next phase. */
+static VkResult record_together(RtrRecorder r, RtrBuild* builds, uint32_t count, bool tops) {
+    VkResult result = VK_SUCCESS;
+    bool recorded = true;
+    uint32_t i;
+    while (recorded) {
+        recorded = false;
+        for (i = 0; i < count; i++) {
+            RtrBuild* b = &builds[i];
+            if (((b->push.flags & RTR_BUILD_TOP) != 0) != tops) continue;
+            b->dispatched = false;
+            while (!b->dispatched && !b->done && result == VK_SUCCESS)
+                result = b->update ? rtr_record_update_phase(b) : rtr_record_build_phase(b);
+            if (result != VK_SUCCESS) return result;
+            recorded |= b->dispatched;
+        }
+        if (recorded) rtr_compute_barrier(r);
+    }
+    return VK_SUCCESS;
+}
+
 /* Launches of this recording look at what it built. */
 static VkResult remember(const RtrBuild* b) {
-    if (!b->device->validation || !b->recorder->control) return VK_SUCCESS;
+    VkResult r = VK_SUCCESS;
+    if (!b->update) r = rtr_remember_built(b->dst, b->info);
+    if (r != VK_SUCCESS || !b->device->validation || !b->recorder->control) return r;
     return rtr_add_checked(b->recorder, b->dst, RTC_ERROR_BUILT);
+}
+
+VkResult rtrCmdBuildAccelerationStructures(RtrRecorder recorder, uint32_t count,
+                                           const RtrAccelerationStructureBuildInfo* infos) {
+    const VkAllocationCallbacks* a = recorder->has_allocator ? &recorder->allocator : NULL;
+    RtrBuild one, *builds = &one;
+    VkResult r = VK_SUCCESS;
+    uint32_t i;
+    if (!count) return VK_SUCCESS;
+    memset(&one, 0, sizeof one);
+    if (count > 1) builds = rtr_alloc(a, count * sizeof *builds);
+    if (!builds) return VK_ERROR_OUT_OF_HOST_MEMORY;
+    for (i = 0; i < count && r == VK_SUCCESS; i++) r = prepare(&builds[i], recorder, &infos[i]);
+    if (r == VK_SUCCESS && count > 1) r = check_overlap(recorder, builds, count);
+    if (r == VK_SUCCESS) r = record_together(recorder, builds, count, false);
+    if (r == VK_SUCCESS) r = record_together(recorder, builds, count, true);
+    for (i = 0; i < count && r == VK_SUCCESS; i++) r = remember(&builds[i]);
+    if (count > 1) rtr_free(a, builds);
+    return r;
 }
 
 VkResult rtrCmdBuildAccelerationStructure(RtrRecorder recorder, const VkAccelerationStructureInfoNV* info,
                                           VkBuffer instanceData, VkDeviceSize instanceOffset, VkBool32 update,
                                           RtrAccelerationStructure dst, RtrAccelerationStructure src,
                                           VkBuffer scratch, VkDeviceSize scratchOffset) {
-    RtrBuild b;
-    bool opaque;
-    VkResult r;
+    RtrAccelerationStructureBuildInfo b;
     memset(&b, 0, sizeof b);
-    b.recorder = recorder;
-    b.device = recorder->device;
-    b.dst = dst;
-    b.scratch = scratch;
-    b.scratch_offset = scratchOffset;
-    b.instance_data = instanceData;
-    b.instance_offset = instanceOffset;
-    if ((r = check_build(&b, info, update, src)) != VK_SUCCESS) return r;
-    b.geometries = info->pGeometries;
-    b.geometry_count = info->geometryCount;
-    b.slots_quad = rtr_slots_quad(dst->primitive_count);
-    b.node_window = window_of(b.device, RTC_NODE_QUADS * RTC_QUAD_BYTES);
-    b.slot_window = window_of(b.device, rtr_slot_quads(dst) * RTC_QUAD_BYTES);
-    b.push.total = b.primitives;
-    b.push.self_lo = (uint32_t)dst->base;
-    b.push.self_hi = (uint32_t)(dst->base >> 32);
-    b.push.slots_quad = b.slots_quad;
-    b.push.heap_quads = dst->heap ? (uint32_t)(dst->heap->size / RTC_QUAD_BYTES) : 0;
-    b.push.slot_quads = rtr_slot_quads(dst);
-    b.push.build_flags = info->flags;
-    b.push.geometry_count = info->geometryCount;
-    if (dst->type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV) b.push.flags |= RTR_BUILD_TOP;
+    b.pInfo = info;
+    b.instanceData = instanceData;
+    b.instanceOffset = instanceOffset;
     b.update = update;
-    if (update) b.push.flags |= RTR_BUILD_UPDATE;
-    if (info->geometryCount && info->pGeometries[0].geometryType == VK_GEOMETRY_TYPE_AABBS_NV)
-        b.push.flags |= RTR_BUILD_AABBS;
-    if (info->flags & VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV)
-        b.push.flags |= RTR_BUILD_KEEP_DEGENERATE;
-    b.push.not_opaque = rtr_first_not_opaque(info);
-    opaque = b.push.not_opaque == 0xffffffffu;
-    b.push.facts = (dst->aabbs ? RTC_FACT_AABBS : 0u) | (opaque ? RTC_FACT_ALL_OPAQUE : 0u) |
-                   (dst->heap ? 0u : RTC_FACT_ADDRESSES);
-    if (update) {
-        rtr_update_scratch(dst, &b.layout);
-        r = rtr_record_update(&b, src);
-        return r == VK_SUCCESS ? remember(&b) : r;
-    }
-    rtr_build_scratch(dst->primitive_count, &b.layout);
-    r = record_build(&b);
-    if (r == VK_SUCCESS) r = rtr_remember_built(dst, info);
-    return r == VK_SUCCESS ? remember(&b) : r;
+    b.dst = dst;
+    b.src = src;
+    b.scratch = scratch;
+    b.scratchOffset = scratchOffset;
+    return rtrCmdBuildAccelerationStructures(recorder, 1, &b);
 }

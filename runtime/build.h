@@ -4,16 +4,26 @@
 
 #include "internal.h"
 
-/* A build being recorded. */
+/* Where reading the input has come to. */
+typedef struct RtrInputCursor {
+    uint32_t geometry, at; /* the next primitive of it */
+    uint32_t first;        /* primitives of the geometries before */
+} RtrInputCursor;
+
+/* A build or update being recorded. */
 typedef struct RtrBuild {
     RtrRecorder recorder;
     RtrDevice device;
-    RtrAccelerationStructure dst;
+    RtrAccelerationStructure dst, src;
+    const VkAccelerationStructureInfoNV* info;
     VkBuffer scratch;
     VkDeviceSize scratch_offset;
     RtrScratchLayout layout;
     VkBuffer instance_data;
     VkDeviceSize instance_offset;
+    VkBuffer indirect; /* ranges of the geometries; NULL: as the host says */
+    VkDeviceSize indirect_offset;
+    uint32_t indirect_stride;
     const VkGeometryNV* geometries;
     uint32_t geometry_count;
     uint32_t primitives; /* of this build: at most those of dst */
@@ -21,7 +31,12 @@ typedef struct RtrBuild {
     struct RtrBuildPush push;
     bool update; /* DST_SLOTS is then a window of the whole structure, see kernels/refit.glsl */
     uint32_t node_window, slot_window; /* nodes, slots one binding reaches */
-    VkDescriptorSet arrays;            /* bound now */
+    VkDescriptorSet arrays, whole;     /* bound last; the one without windows */
+    /* How far it is recorded. */
+    uint32_t phase, window;
+    RtrInputCursor cursor;
+    bool dispatched; /* in this phase */
+    bool done;
 } RtrBuild;
 
 static inline RtrKernel rtr_instance_kernel(RtrAccelerationStructure dst) {
@@ -50,11 +65,14 @@ bool rtr_vertex_format(VkFormat format, uint32_t* code, uint32_t* bytes, uint32_
  * arrays of size 0 in the layout are left out. */
 VkResult rtr_bind_arrays(RtrBuild* b, uint32_t nodes_at, uint32_t slots_at);
 void rtr_dispatch(RtrBuild* b, RtrKernel kernel, uint64_t groups);
+/* The same with the arrays bound without windows. */
+VkResult rtr_dispatch_whole(RtrBuild* b, RtrKernel kernel, uint64_t groups);
 
-/* Calls `emit` for every piece of the inputs that one set of bindings reaches, with set 0
- * bound and the push constants of the piece filled in. */
-typedef VkResult (*RtrInputFunction)(RtrBuild* b);
-VkResult rtr_for_each_input(RtrBuild* b, RtrInputFunction emit);
+/* Binds the next piece of the input that one set of bindings reaches as set 0 and fills in the
+ * push constants. *more is false when there is none; the cursor is then at the start again. */
+VkResult rtr_next_input(RtrBuild* b, bool* more);
+/* Of an indirect build: brings the ranges into the state words. */
+VkResult rtr_load_ranges(RtrBuild* b);
 
 /* One buffer of set 0 (RTR_IN_*) or 1 (RTR_ARR_*). */
 typedef struct RtrBinding {
@@ -84,6 +102,9 @@ VkResult rtr_check_update(RtrAccelerationStructure src, const VkAccelerationStru
 VkResult rtr_emit_leaves(RtrBuild* b);
 /* Nodes there may be in a structure, compacted or not. */
 uint32_t rtr_most_nodes(const struct RtrAccelerationStructure_T* as);
-VkResult rtr_record_update(RtrBuild* b, RtrAccelerationStructure src);
+/* Record the next part of a build or an update; may find that there is nothing to do in it. */
+VkResult rtr_record_build_phase(RtrBuild* b);
+VkResult rtr_record_update_phase(RtrBuild* b);
+VkResult rtr_check_update_reach(RtrBuild* b);
 
 #endif /* RTR_BUILD_H_ */

@@ -60,108 +60,136 @@ static VkResult too_large(RtrBuild* b, const char* what, uint32_t g, VkDeviceSiz
                      (unsigned long long)bytes, b->device->limits.maxStorageBufferRange);
 }
 
-static VkResult triangles(RtrBuild* b, uint32_t g, uint32_t first, uint32_t count, RtrInputFunction emit) {
+/* Of an indirect build only the device knows how far into a buffer its input lies. */
+static Window input(RtrBuild* b, VkBuffer buffer, VkDeviceSize begin, VkDeviceSize end, uint32_t* residual) {
+    Window w = window(buffer, begin, end, residual);
+    if (b->indirect) w.range = VK_WHOLE_SIZE;
+    return w;
+}
+
+/* Takes the cursor's next piece: at most `most` primitives of `count`; the last moves it on. */
+static uint32_t take(RtrBuild* b, uint32_t count, VkDeviceSize most, uint32_t geometry) {
+    RtrInputCursor* c = &b->cursor;
+    const uint32_t n = count - c->at < most ? count - c->at : (uint32_t)most;
+    b->push.count = n;
+    b->push.first = c->first + c->at;
+    b->push.primitive_base = c->at;
+    b->push.geometry = geometry;
+    b->push.ranges = b->indirect ? b->layout.ranges + RTR_RANGE_WORDS * c->geometry : 0;
+    c->at += n;
+    if (c->at == count) {
+        c->geometry++;
+        c->first += count;
+        c->at = 0;
+    }
+    return n;
+}
+
+static VkResult indirect_pieces(RtrBuild* b, uint32_t g) {
+    return rtr_error(b->device, VK_ERROR_FEATURE_NOT_PRESENT, "maxStorageBufferRange",
+                     "geometry %u of an indirect build: its input must lie within maxStorageBufferRange (%u)", g,
+                     b->device->limits.maxStorageBufferRange);
+}
+
+static VkResult triangles(RtrBuild* b, uint32_t count) {
+    const uint32_t g = b->cursor.geometry, at = b->cursor.at;
     const VkGeometryTrianglesNV* t = &b->geometries[g].geometry.triangles;
     const VkDeviceSize limit = b->device->limits.maxStorageBufferRange - 1024u;
     const bool indexed = t->indexType != VK_INDEX_TYPE_NONE_NV;
     const VkDeviceSize index_size = rtr_index_size(t->indexType);
-    uint32_t code = 0, size = 12, component = 4;
+    uint32_t code = 0, size = 12, component = 4, n;
     const bool known = rtr_vertex_format(t->vertexFormat, &code, &size, &component);
     const VkDeviceSize vertex_bytes =
         known && t->vertexCount ? (t->vertexCount - 1) * t->vertexStride + size : 0;
-    VkDeviceSize bytes_each = indexed ? 3 * index_size : 3 * t->vertexStride;
-    uint32_t chunk = bytes_each ? (uint32_t)rtr_min_size(limit / bytes_each, count) : count;
-    uint32_t at;
+    const VkDeviceSize bytes_each = indexed ? 3 * index_size : 3 * t->vertexStride;
+    const VkDeviceSize most = bytes_each ? limit / bytes_each : count;
+    Window data, index = {VK_NULL_HANDLE, 0, 0}, transform = {VK_NULL_HANDLE, 0, 0};
     if (!t->vertexData || (indexed && !t->indexData))
         return rtr_error(b->device, VK_ERROR_VALIDATION_FAILED_EXT, "geometry-data",
                          "geometry %u: %s is VK_NULL_HANDLE", g, t->vertexData ? "indexData" : "vertexData");
     if (indexed && vertex_bytes > limit) return too_large(b, "vertex data", g, vertex_bytes);
-    if (chunk == 0) return too_large(b, "one triangle", g, bytes_each);
-    for (at = 0; at < count; at += chunk) {
-        uint32_t n = count - at < chunk ? count - at : chunk;
-        Window data, index = {VK_NULL_HANDLE, 0, 0}, transform = {VK_NULL_HANDLE, 0, 0};
-        VkResult r;
-        b->push.flags &= ~RTR_BUILD_HAS_TRANSFORM;
-        if (indexed) {
-            VkDeviceSize begin = t->indexOffset + at * bytes_each;
-            data =
-                window(t->vertexData, t->vertexOffset, t->vertexOffset + vertex_bytes, &b->push.data_offset);
-            index = window(t->indexData, begin, begin + n * bytes_each, &b->push.index_offset);
-            b->push.vertex_count = t->vertexCount;
-            b->push.index_type = index_size == 1 ? RTR_INDEX_8 : index_size == 2 ? RTR_INDEX_16 : RTR_INDEX_32;
-        } else {
-            VkDeviceSize begin = t->vertexOffset + at * bytes_each;
-            data = window(t->vertexData, begin, begin + (3 * n - 1) * t->vertexStride + size,
-                          &b->push.data_offset);
-            b->push.vertex_count = 3 * n;
-            b->push.index_type = RTR_INDEX_NONE;
-        }
-        if (t->transformData) {
-            transform = window(t->transformData, t->transformOffset, t->transformOffset + 48,
-                               &b->push.transform_offset);
-            b->push.flags |= RTR_BUILD_HAS_TRANSFORM;
-        }
-        b->push.count = n;
-        b->push.first = first + at;
-        b->push.primitive_base = at;
-        b->push.geometry = rtr_slot_word(&b->geometries[g], g);
-        b->push.data_stride = (uint32_t)t->vertexStride;
-        b->push.vertex_format = code;
-        if ((r = bind_inputs(b, data, index, transform)) != VK_SUCCESS || (r = emit(b)) != VK_SUCCESS)
-            return r;
+    if (most == 0) return too_large(b, "one triangle", g, bytes_each);
+    if (b->indirect && most < count) return indirect_pieces(b, g);
+    n = take(b, count, most, rtr_slot_word(&b->geometries[g], g));
+    b->push.flags &= ~RTR_BUILD_HAS_TRANSFORM;
+    if (indexed) {
+        const VkDeviceSize begin = t->indexOffset + at * bytes_each;
+        data = input(b, t->vertexData, t->vertexOffset, t->vertexOffset + vertex_bytes, &b->push.data_offset);
+        index = input(b, t->indexData, begin, begin + n * bytes_each, &b->push.index_offset);
+        b->push.vertex_count = t->vertexCount;
+        b->push.index_type = index_size == 1 ? RTR_INDEX_8 : index_size == 2 ? RTR_INDEX_16 : RTR_INDEX_32;
+    } else {
+        const VkDeviceSize begin = t->vertexOffset + at * bytes_each;
+        data = input(b, t->vertexData, begin, begin + (3 * n - 1) * t->vertexStride + size, &b->push.data_offset);
+        b->push.vertex_count = 3 * n;
+        b->push.index_type = RTR_INDEX_NONE;
     }
-    return VK_SUCCESS;
+    if (t->transformData) {
+        transform = input(b, t->transformData, t->transformOffset, t->transformOffset + 48,
+                          &b->push.transform_offset);
+        b->push.flags |= RTR_BUILD_HAS_TRANSFORM;
+    }
+    b->push.data_stride = (uint32_t)t->vertexStride;
+    b->push.vertex_format = code;
+    return bind_inputs(b, data, index, transform);
 }
 
 /* AABBs and instances: records of a fixed stride. */
 static VkResult records(RtrBuild* b, VkBuffer buffer, VkDeviceSize offset, VkDeviceSize stride,
-                        VkDeviceSize size, uint32_t geometry, uint32_t first, uint32_t count, uint32_t most,
-                        RtrInputFunction emit) {
+                        VkDeviceSize size, uint32_t geometry, uint32_t count, VkDeviceSize most) {
     const VkDeviceSize limit = b->device->limits.maxStorageBufferRange - 1024u;
-    uint32_t chunk = stride ? (uint32_t)rtr_min_size(limit / stride, count) : count;
-    uint32_t at;
-    if (chunk > most) chunk = most;
-    for (at = 0; at < count; at += chunk) {
-        const Window none = {VK_NULL_HANDLE, 0, 0};
-        uint32_t n = count - at < chunk ? count - at : chunk;
-        VkDeviceSize begin = offset + at * stride;
-        VkResult r;
-        Window data = window(buffer, begin, begin + (n - 1) * stride + size, &b->push.data_offset);
-        b->push.count = n;
-        b->push.first = first + at;
-        b->push.primitive_base = at;
-        b->push.geometry = geometry;
-        b->push.data_stride = (uint32_t)stride;
-        if ((r = bind_inputs(b, data, none, none)) != VK_SUCCESS || (r = emit(b)) != VK_SUCCESS) return r;
+    const VkDeviceSize begin = offset + b->cursor.at * stride;
+    const Window none = {VK_NULL_HANDLE, 0, 0};
+    Window data;
+    uint32_t n;
+    if (stride && limit / stride < most) most = limit / stride;
+    if (b->indirect && most < count) return indirect_pieces(b, b->cursor.geometry);
+    n = take(b, count, most, geometry);
+    data = input(b, buffer, begin, begin + (n - 1) * stride + size, &b->push.data_offset);
+    b->push.data_stride = (uint32_t)stride;
+    return bind_inputs(b, data, none, none);
+}
+
+VkResult rtr_next_input(RtrBuild* b, bool* more) {
+    RtrInputCursor* c = &b->cursor;
+    const RtrInputCursor start = {0, 0, 0};
+    *more = true;
+    if (b->dst->type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV) {
+        if (b->primitives && !c->geometry)
+            return records(b, b->instance_data, b->instance_offset, 64, 64, 0, b->primitives, b->slot_window);
+    } else {
+        for (; c->geometry < b->geometry_count; c->geometry++) {
+            const VkGeometryNV* geometry = &b->geometries[c->geometry];
+            const VkGeometryAABBNV* boxes = &geometry->geometry.aabbs;
+            uint32_t count = 0;
+            VkResult r = rtr_check_geometry(b->device, geometry, c->geometry, &count);
+            if (r != VK_SUCCESS) return r;
+            if (!count) continue;
+            if (geometry->geometryType == VK_GEOMETRY_TYPE_TRIANGLES_NV) return triangles(b, count);
+            if (!boxes->aabbData)
+                return rtr_error(b->device, VK_ERROR_VALIDATION_FAILED_EXT, "geometry-data",
+                                 "geometry %u: aabbData is VK_NULL_HANDLE", c->geometry);
+            return records(b, boxes->aabbData, boxes->offset, boxes->stride, 24,
+                           rtr_slot_word(geometry, c->geometry), count, count);
+        }
     }
+    *more = false;
+    *c = start;
     return VK_SUCCESS;
 }
 
-VkResult rtr_for_each_input(RtrBuild* b, RtrInputFunction emit) {
-    uint32_t g, first = 0;
-    if (b->dst->type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV) {
-        if (!b->primitives) return VK_SUCCESS;
-        return records(b, b->instance_data, b->instance_offset, 64, 64, 0, 0, b->primitives, b->slot_window,
-                       emit);
-    }
-    for (g = 0; g < b->geometry_count; g++) {
-        const VkGeometryNV* geometry = &b->geometries[g];
-        uint32_t count = 0;
-        VkResult r = rtr_check_geometry(b->device, geometry, g, &count);
-        if (r != VK_SUCCESS) return r;
-        if (!count) continue;
-        if (geometry->geometryType == VK_GEOMETRY_TYPE_TRIANGLES_NV) {
-            r = triangles(b, g, first, count, emit);
-        } else {
-            const VkGeometryAABBNV* boxes = &geometry->geometry.aabbs;
-            if (!boxes->aabbData)
-                return rtr_error(b->device, VK_ERROR_VALIDATION_FAILED_EXT, "geometry-data",
-                                 "geometry %u: aabbData is VK_NULL_HANDLE", g);
-            r = records(b, boxes->aabbData, boxes->offset, boxes->stride, 24, rtr_slot_word(geometry, g), first,
-                        count, count, emit);
-        }
-        if (r != VK_SUCCESS) return r;
-        first += count;
-    }
-    return VK_SUCCESS;
+VkResult rtr_load_ranges(RtrBuild* b) {
+    const Window none = {VK_NULL_HANDLE, 0, 0};
+    const uint32_t count = b->push.flags & RTR_BUILD_TOP ? 1 : b->geometry_count;
+    Window ranges;
+    VkResult r;
+    if (!b->indirect || !count) return VK_SUCCESS;
+    ranges = window(b->indirect, b->indirect_offset,
+                    b->indirect_offset + (VkDeviceSize)(count - 1) * b->indirect_stride + 4 * RTR_RANGE_WORDS,
+                    &b->push.data_offset);
+    b->push.count = count;
+    b->push.data_stride = b->indirect_stride;
+    b->push.ranges = b->layout.ranges;
+    if ((r = bind_inputs(b, ranges, none, none)) != VK_SUCCESS) return r;
+    return rtr_dispatch_whole(b, RTR_KERNEL_ranges, rtr_groups(count, RTR_GROUP));
 }

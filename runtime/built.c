@@ -26,6 +26,10 @@ static RtrBuiltGeometry describe(const VkGeometryNV* g) {
     return b;
 }
 
+uint32_t rtr_built_geometries(const struct RtrAccelerationStructure_T* as) {
+    return as->built ? as->built->geometry_count : 0;
+}
+
 void rtr_forget_built(RtrAccelerationStructure as) {
     struct RtrBuilt* b = as->built;
     as->built = NULL;

@@ -73,6 +73,7 @@ RtrGetBufferDeviceAddress rtr_load_buffer_device_address(const RtrInstanceTable*
 /* ---- Kernels ------------------------------------------------------------------- */
 #define RTR_KERNELS(X)  \
     X(init)             \
+    X(ranges)           \
     X(leaf_triangles)   \
     X(leaf_aabbs)       \
     X(leaf_instances)   \
@@ -339,8 +340,10 @@ typedef struct RtrScratchLayout {
     VkDeviceSize offset[RTR_ARR_COUNT];
     VkDeviceSize size[RTR_ARR_COUNT];
     VkDeviceSize total;
+    uint32_t ranges; /* word of STATE where the ranges of indirect builds start */
 } RtrScratchLayout;
-void rtr_build_scratch(uint32_t primitives, RtrScratchLayout* layout);
+void rtr_build_scratch(uint32_t primitives, uint32_t geometries, RtrScratchLayout* layout);
+uint32_t rtr_built_geometries(const struct RtrAccelerationStructure_T* as); /* 0: not known */
 void rtr_update_scratch(const struct RtrAccelerationStructure_T* as, RtrScratchLayout* layout);
 
 static inline uint32_t rtr_slot_quads(const struct RtrAccelerationStructure_T* as) {

@@ -1,73 +1,99 @@
-/* Updates (refits): the tree stays, boxes and slots follow the geometry. */
+/* Updates (refits) as phases: the tree stays, boxes and slots follow the geometry. */
 #include "build.h"
 
-static VkResult emit_instances(RtrBuild* b) {
-    rtr_dispatch(b, rtr_instance_kernel(b->dst), rtr_groups(b->push.count, RTR_GROUP));
-    return VK_SUCCESS;
+/* A slot that begins in a window may end behind its last quad. */
+static uint32_t window_quads(RtrDevice d) {
+    return (d->limits.maxStorageBufferRange / RTC_QUAD_BYTES - RTC_INSTANCE_QUADS) / 16u * 16u;
 }
 
-static VkResult emit_slots(RtrBuild* b) {
+static void emit(RtrBuild* b) {
     const bool aabbs = b->push.flags & RTR_BUILD_AABBS;
     uint32_t lanes = b->push.window_count / (aabbs ? RTC_AABB_QUADS : RTC_TRIANGLE_QUADS) + 1;
+    if (b->push.flags & RTR_BUILD_TOP) {
+        rtr_dispatch(b, rtr_instance_kernel(b->dst), rtr_groups(b->push.count, RTR_GROUP));
+        return;
+    }
     if (lanes > b->primitives) lanes = b->primitives;
     rtr_dispatch(b, aabbs ? RTR_KERNEL_refit_aabbs : RTR_KERNEL_refit_triangles, rtr_groups(lanes, RTR_GROUP));
-    return VK_SUCCESS;
 }
 
-/* The slots as windows of the whole structure: where they start only its header says. */
-static VkResult for_each_window(RtrBuild* b, RtrInputFunction emit) {
-    const uint32_t limit = b->device->limits.maxStorageBufferRange / RTC_QUAD_BYTES;
-    /* A slot that begins in a window may end behind its last quad. */
-    const uint32_t step = (limit - RTC_INSTANCE_QUADS) / 16u * 16u;
-    const uint64_t quads = b->dst->size / RTC_QUAD_BYTES;
-    uint64_t at;
-    for (at = 0; at < quads; at += step) {
-        VkResult r = rtr_bind_arrays(b, 0, (uint32_t)at);
-        if (r != VK_SUCCESS) return r;
-        b->push.window_first = (uint32_t)at;
-        b->push.window_count = step;
-        if ((r = rtr_for_each_input(b, emit)) != VK_SUCCESS) return r;
+/* A piece of the input into a window of the whole structure: where slots start only its header says. */
+static VkResult slots(RtrBuild* b) {
+    const uint64_t at = (uint64_t)b->window * window_quads(b->device);
+    bool more;
+    VkResult r;
+    if (at >= b->dst->size / RTC_QUAD_BYTES) {
+        b->phase++;
+        return VK_SUCCESS;
     }
+    if ((r = rtr_next_input(b, &more)) != VK_SUCCESS) return r;
+    if (!more) {
+        b->window++;
+        return VK_SUCCESS;
+    }
+    if ((r = rtr_bind_arrays(b, 0, (uint32_t)at)) != VK_SUCCESS) return r;
+    b->push.window_first = (uint32_t)at;
+    b->push.window_count = window_quads(b->device);
+    emit(b);
     return VK_SUCCESS;
 }
 
 /* With validation: how many primitives are active now, for refit_nodes to compare. */
 static VkResult count_active(RtrBuild* b) {
     const uint64_t room = b->layout.size[RTR_ARR_MARKS] / 4;
-    if (!b->device->validation || b->push.flags & RTR_BUILD_TOP || b->primitives > room ||
-        32ull * b->primitives > b->layout.size[RTR_ARR_LEAF_BOX])
-        return VK_SUCCESS;
-    b->push.flags |= RTR_BUILD_COUNTED;
-    return rtr_for_each_input(b, rtr_emit_leaves);
+    bool more = false;
+    VkResult r = VK_SUCCESS;
+    if (b->device->validation && !(b->push.flags & RTR_BUILD_TOP) && b->primitives <= room &&
+        32ull * b->primitives <= b->layout.size[RTR_ARR_LEAF_BOX]) {
+        b->push.flags |= RTR_BUILD_COUNTED;
+        r = rtr_next_input(b, &more);
+    }
+    if (r == VK_SUCCESS && more) return rtr_emit_leaves(b);
+    b->phase++;
+    return r;
 }
 
-VkResult rtr_record_update(RtrBuild* b, RtrAccelerationStructure src) {
-    RtrDevice d = b->device;
-    uint32_t nodes = rtr_most_nodes(b->dst);
-    VkResult r;
-    if (nodes > rtr_node_room(b->primitives)) nodes = rtr_node_room(b->primitives);
-    if (nodes > b->node_window)
-        return rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "maxStorageBufferRange",
-                         "update of %u primitives: maxStorageBufferRange %u reaches the nodes of %u",
-                         b->primitives, d->limits.maxStorageBufferRange, b->node_window);
-    if (src && src != b->dst) {
-        r = rtrCmdCopyAccelerationStructure(b->recorder, b->dst, src,
-                                            VK_COPY_ACCELERATION_STRUCTURE_MODE_CLONE_NV);
-        if (r != VK_SUCCESS) return r;
-        rtr_compute_barrier(b->recorder);
+static uint32_t nodes(const RtrBuild* b) {
+    const uint32_t most = rtr_most_nodes(b->dst), room = rtr_node_room(b->primitives);
+    return most < room ? most : room;
+}
+
+VkResult rtr_check_update_reach(RtrBuild* b) {
+    if (nodes(b) <= b->node_window) return VK_SUCCESS;
+    return rtr_error(b->device, VK_ERROR_FEATURE_NOT_PRESENT, "maxStorageBufferRange",
+                     "update of %u primitives: maxStorageBufferRange %u reaches the nodes of %u", b->primitives,
+                     b->device->limits.maxStorageBufferRange, b->node_window);
+}
+
+enum { COPY, INIT, RANGES, COUNT, LINKS, CHECK, SLOTS, NODES };
+
+VkResult rtr_record_update_phase(RtrBuild* b) {
+    switch (b->phase) {
+        case COPY:
+            b->phase++;
+            if (!b->src || b->src == b->dst) return VK_SUCCESS;
+            b->dispatched = true;
+            return rtrCmdCopyAccelerationStructure(b->recorder, b->dst, b->src,
+                                                   VK_COPY_ACCELERATION_STRUCTURE_MODE_CLONE_NV);
+        case INIT:
+            b->phase++;
+            return rtr_dispatch_whole(b, RTR_KERNEL_init, 1);
+        case RANGES:
+            b->phase++;
+            return rtr_load_ranges(b);
+        case COUNT:
+            return count_active(b);
+        case LINKS:
+            b->phase++;
+            return rtr_dispatch_whole(b, RTR_KERNEL_refit_links,
+                                      rtr_groups(b->primitives > nodes(b) ? b->primitives : nodes(b), RTR_GROUP));
+        case CHECK:
+            b->phase++;
+            return b->push.flags & RTR_BUILD_TOP ? rtr_check_build_instances(b, RTR_ARR_LINKS) : VK_SUCCESS;
+        case SLOTS:
+            return slots(b);
+        default:
+            b->done = true;
+            return rtr_dispatch_whole(b, RTR_KERNEL_refit_nodes, rtr_groups(nodes(b), RTR_GROUP));
     }
-    if ((r = rtr_bind_arrays(b, 0, 0)) != VK_SUCCESS) return r;
-    rtr_dispatch(b, RTR_KERNEL_init, 1);
-    if ((r = count_active(b)) != VK_SUCCESS) return r;
-    rtr_dispatch(b, RTR_KERNEL_refit_links,
-                 rtr_groups(b->primitives > nodes ? b->primitives : nodes, RTR_GROUP));
-    if (b->push.flags & RTR_BUILD_TOP) {
-        if ((r = rtr_check_build_instances(b, RTR_ARR_LINKS)) != VK_SUCCESS) return r;
-        r = for_each_window(b, emit_instances);
-    } else {
-        r = for_each_window(b, emit_slots);
-    }
-    if (r != VK_SUCCESS || (r = rtr_bind_arrays(b, 0, 0)) != VK_SUCCESS) return r;
-    rtr_dispatch(b, RTR_KERNEL_refit_nodes, rtr_groups(nodes, RTR_GROUP));
-    return VK_SUCCESS;
 }

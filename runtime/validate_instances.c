@@ -121,13 +121,15 @@ static VkResult look_through(Check* c) {
 
 /* `header` and `marks`: the buffers of the kernel's other step stand in for what it does not use. */
 static VkResult dispatch(Check* c, VkDescriptorBufferInfo records, VkDescriptorBufferInfo header,
-                         VkDescriptorBufferInfo marks, VkDescriptorBufferInfo control) {
-    const RtrBinding bindings[5] = {{0, RTR_IN_DATA, records},
+                         VkDescriptorBufferInfo state, VkDescriptorBufferInfo marks,
+                         VkDescriptorBufferInfo control) {
+    const RtrBinding bindings[6] = {{0, RTR_IN_DATA, records},
                                     {0, RTR_IN_INDEX, c->table},
                                     {0, RTR_IN_TRANSFORM, header},
+                                    {1, RTR_ARR_STATE, state},
                                     {1, RTR_ARR_MARKS, marks},
                                     {1, RTR_ARR_DST_HEADER, control}};
-    VkResult result = rtr_bind_sets(c->r, c->heap, bindings, 5);
+    VkResult result = rtr_bind_sets(c->r, c->heap, bindings, 6);
     if (result != VK_SUCCESS) return result;
     rtr_dispatch_kernel(c->r, c->heap ? RTR_KERNEL_check_instances : RTR_KERNEL_check_instances_address, &c->push,
                         rtr_groups(c->push.count, RTR_GROUP));
@@ -140,19 +142,22 @@ static VkResult dispatch(Check* c, VkDescriptorBufferInfo records, VkDescriptorB
 static VkResult look_at_input(Check* c) {
     const RtrBuild* b = c->build;
     const uint32_t most = (b->device->limits.maxStorageBufferRange - 1024u) / 64u;
-    VkDescriptorBufferInfo records = {b->instance_data, 0, 0}, marks = {b->scratch, 0, 0};
+    VkDescriptorBufferInfo records = {b->instance_data, 0, 0}, marks = {b->scratch, 0, 0}, state = marks;
     uint32_t at;
     marks.offset = b->scratch_offset + b->layout.offset[RTR_ARR_MARKS];
     marks.range = rtr_min_size(b->layout.size[RTR_ARR_MARKS], b->device->limits.maxStorageBufferRange);
+    state.offset = b->scratch_offset + b->layout.offset[RTR_ARR_STATE];
+    state.range = b->layout.size[RTR_ARR_STATE];
+    c->push.ranges = b->indirect ? b->layout.ranges : 0;
     for (at = 0; at < b->primitives; at += most) {
         const VkDeviceSize begin = b->instance_offset + 64ull * at;
         VkResult result;
         c->push.first = at;
         c->push.count = b->primitives - at < most ? b->primitives - at : most;
         records.offset = begin / 256 * 256;
-        records.range = begin - records.offset + 64ull * c->push.count;
+        records.range = b->indirect ? VK_WHOLE_SIZE : begin - records.offset + 64ull * c->push.count;
         c->push.data_offset = (uint32_t)(begin - records.offset);
-        if ((result = dispatch(c, records, c->table, marks, marks)) != VK_SUCCESS) return result;
+        if ((result = dispatch(c, records, c->table, state, marks, marks)) != VK_SUCCESS) return result;
     }
     return VK_SUCCESS;
 }
@@ -212,7 +217,7 @@ static VkResult look_at_records(Check* c) {
         records.range = rtr_min_size(top->size - at, window);
         c->push.window_first = (uint32_t)(at / RTC_QUAD_BYTES);
         c->push.window_count = (uint32_t)(records.range / RTC_QUAD_BYTES);
-        result = dispatch(c, records, rtr_header_info(top), c->control, c->control);
+        result = dispatch(c, records, rtr_header_info(top), c->control, c->control, c->control);
         if (result != VK_SUCCESS) return result;
     }
     return VK_SUCCESS;

@@ -451,6 +451,42 @@ RTR_API VkResult rtrCmdBuildAccelerationStructure(RtrRecorder recorder,
                                                   RtrAccelerationStructure src, VkBuffer scratch,
                                                   VkDeviceSize scratchOffset);
 
+/* One of several builds or updates, and where ranges on the device are given. */
+typedef struct RtrAccelerationStructureBuildInfo {
+    const void* pNext; /* must be NULL */
+    /* The arguments of rtrCmdBuildAccelerationStructure. */
+    const VkAccelerationStructureInfoNV* pInfo;
+    VkBuffer instanceData;
+    VkDeviceSize instanceOffset;
+    VkBool32 update;
+    RtrAccelerationStructure dst, src;
+    VkBuffer scratch;
+    VkDeviceSize scratchOffset;
+    /* Unless it is VK_NULL_HANDLE, a STORAGE buffer with a VkAccelerationStructureBuildRangeInfoKHR
+     * for each geometry (one for the instances of a top level), indirectStride bytes apart from
+     * indirectOffset on (multiples of 4), read in COMPUTE_SHADER with SHADER_READ. pInfo's counts
+     * are then the largest there may be, and primitiveCount says how many there are; primitiveOffset
+     * (bytes into indices, into vertices without indices, AABBs or instances), firstVertex (added to
+     * indices, and to the number of the vertex) and transformOffset (bytes) are as KHR has them, with
+     * its alignments: added to the offsets of pInfo, whose vertexCount bounds every vertex number.
+     * Buffers of geometry end within maxStorageBufferRange of those offsets. */
+    VkBuffer indirectBuffer;
+    VkDeviceSize indirectOffset;
+    uint32_t indirectStride;
+} RtrAccelerationStructureBuildInfo;
+
+/* Any number of builds and updates in one call, with a barrier a phase for all of them instead of
+ * each its own: many small ones then fill a device. First the bottom levels, then the top levels,
+ * which may refer to them. Each needs scratch of its own. Otherwise as
+ * rtrCmdBuildAccelerationStructure. What an indirect build leaves out counts as inactive: an update
+ * has the same largest counts and the same primitives. The time of an indirect build is that of the
+ * largest counts.
+ * Counterpart: vkCmdBuildAccelerationStructuresKHR and -IndirectKHR.
+ * Errors: those of rtrCmdBuildAccelerationStructure; VALIDATION_FAILED when two of them write the
+ * same memory, or for misaligned indirect data. */
+RTR_API VkResult rtrCmdBuildAccelerationStructures(RtrRecorder recorder, uint32_t infoCount,
+                                                   const RtrAccelerationStructureBuildInfo* pInfos);
+
 /* Where a geometry's data lies for a build on the host, in place of the buffers that its
  * VkGeometryNV names (which are ignored). Its offsets count from these pointers. */
 typedef struct RtrHostGeometry {

@@ -115,7 +115,15 @@ struct RtrBuildPush {
     RTR_UINT heap_quads;     /* size of the heap: instance references are checked against it */
     RTR_UINT vertex_format;  /* RTR_VERTEX_* */
     RTR_UINT not_opaque;     /* header of a bottom level: its word of RTC_HDR_OFFENDERS */
+    RTR_UINT ranges;         /* indirect: word of STATE where this geometry's range is; 0: not indirect */
 };
+
+/* Words of a range in STATE: VkAccelerationStructureBuildRangeInfoKHR. */
+#define RTR_RANGE_COUNT 0u
+#define RTR_RANGE_OFFSET 1u
+#define RTR_RANGE_FIRST_VERTEX 2u
+#define RTR_RANGE_TRANSFORM 3u
+#define RTR_RANGE_WORDS 4u
 
 /* What the property kernel answers (p.count). */
 #define RTR_PROPERTY_COMPACTED_SIZE 0u

@@ -15,6 +15,7 @@
 // control block, p.geometry what detail2 is to say, p.facts: look at the header too.
 #include "common.glsl"
 #include "block.glsl"
+#include "range.glsl"
 
 void report(uint code, uint detail, uint detail2) {
     if (atomicCompSwap(dst_header[RTC_CTRL_ERROR], RTC_LAUNCH_ERROR_NONE, code) == RTC_LAUNCH_ERROR_NONE) {
@@ -44,8 +45,8 @@ void main() {
     uint i = lane_index();
     uint at;
     if (p.step == 0u) {
-        if (i >= p.count) return;
-        at = (p.data_offset >> 2) + i * 16u + 14u;
+        if (i >= p.count || (p.ranges != 0u && p.first + i >= state[p.ranges + RTR_RANGE_COUNT])) return;
+        at = ((p.data_offset + range_offset()) >> 2) + i * 16u + 14u;
     } else {
         if (i == 0u && p.facts != 0u) {
             if (in_transform[RTC_HDR_MAGIC] != RTC_AS_MAGIC || in_transform[RTC_HDR_KIND] != p.step - 1u)

@@ -1,14 +1,17 @@
 // Reading the application's geometry. The box kernel and the slot kernel both come
 // here, and `precise` makes their vertices the same bits.
 
+#include "range.glsl"
+
 uint read_index(uint i) {
     if (p.index_type == RTR_INDEX_NONE) return i;
-    if (p.index_type == RTR_INDEX_32) return in_index[(p.index_offset >> 2) + i];
+    uint start = p.index_offset + range_offset();
+    if (p.index_type == RTR_INDEX_32) return in_index[(start >> 2) + i];
     if (p.index_type == RTR_INDEX_8) {
-        uint at = p.index_offset + i;
+        uint at = start + i;
         return (in_index[at >> 2] >> (8u * (at & 3u))) & 0xffu;
     }
-    uint byte = p.index_offset + 2u * i;
+    uint byte = start + 2u * i;
     return (in_index[byte >> 2] >> (8u * (byte & 2u))) & 0xffffu;
 }
 
@@ -29,10 +32,11 @@ vec3 decode_vertex(uint byte) {
 
 vec3 read_vertex(uint index) {
     // An index beyond the vertex count is the application's error; never read outside.
-    index = min(index, p.vertex_count - 1u);
-    vec3 v = decode_vertex(p.data_offset + index * p.data_stride);
+    index = min(index + range_first_vertex(), p.vertex_count - 1u);
+    uint start = p.data_offset + (p.index_type == RTR_INDEX_NONE ? range_offset() : 0u);
+    vec3 v = decode_vertex(start + index * p.data_stride);
     if ((p.flags & RTR_BUILD_HAS_TRANSFORM) == 0u) return v;
-    uint t = p.transform_offset >> 2;
+    uint t = (p.transform_offset + range_transform()) >> 2;
     precise vec3 r;
     for (uint k = 0u; k < 3u; k++) {
         float m0 = uintBitsToFloat(in_transform[t + 4u * k]);
@@ -60,7 +64,7 @@ bool triangle_active(vec3 v0, vec3 v1, vec3 v2) {
 }
 
 void read_aabb(uint i, out vec3 lo, out vec3 hi) {
-    uint w = (p.data_offset + i * p.data_stride) >> 2;
+    uint w = (p.data_offset + range_offset() + i * p.data_stride) >> 2;
     lo = vec3(uintBitsToFloat(in_data[w]), uintBitsToFloat(in_data[w + 1u]), uintBitsToFloat(in_data[w + 2u]));
     hi = vec3(uintBitsToFloat(in_data[w + 3u]), uintBitsToFloat(in_data[w + 4u]), uintBitsToFloat(in_data[w + 5u]));
 }

@@ -11,7 +11,7 @@ void main() {
     bool in_range = i < p.count;
     vec3 lo = vec3(0.0), hi = vec3(0.0);
     bool active_ = false;
-    if (in_range) {
+    if (in_range && in_range_of_geometry(i)) {
         read_aabb(i, lo, hi);
         active_ = !any_nan(lo) && !any_nan(hi);
     }

@@ -8,6 +8,7 @@
 #include "common.glsl"
 #include "leaf.glsl"
 #include "block.glsl"
+#include "range.glsl"
 #include "refit.glsl"
 
 // ---- two-float arithmetic (Dekker 1971, Knuth): hi + lo, |lo| <= ulp(hi) / 2 ----
@@ -116,14 +117,16 @@ void main() {
     bool active_ = false;
     vec3 lo = vec3(0.0), hi = vec3(0.0);
     if (in_range) {
-        uint at = (p.data_offset >> 2) + i * 16u;
+        // Beyond an indirect count nothing is read, and the record is that of an inactive instance.
+        bool given = in_range_of_geometry(i);
+        uint at = ((p.data_offset + range_offset()) >> 2) + i * 16u;
         vec4 m[3];
         for (uint r = 0u; r < 3u; r++)
-            for (uint k = 0u; k < 4u; k++) m[r][k] = uintBitsToFloat(in_data[at + 4u * r + k]);
-        uint id_mask = in_data[at + 12u];
-        uint sbt_flags = in_data[at + 13u];
-        uint base_lo = in_data[at + 14u];
-        uint base_hi = in_data[at + 15u];
+            for (uint k = 0u; k < 4u; k++) m[r][k] = given ? uintBitsToFloat(in_data[at + 4u * r + k]) : 0.0;
+        uint id_mask = given ? in_data[at + 12u] : 0u;
+        uint sbt_flags = given ? in_data[at + 13u] : 0u;
+        uint base_lo = given ? in_data[at + 14u] : 0u;
+        uint base_hi = given ? in_data[at + 15u] : 0u;
         active_ = (base_lo | base_hi) != 0u;
         // A reference to nothing that was built here is never followed; the header tells
         // which instance it was.
@@ -202,8 +205,10 @@ void main() {
             changed_activity(p.first + i);
         for (uint r = 0u; r < 3u; r++) {
             dst_slots[rec + r] = floatBitsToUint(w[r]);
-            dst_slots[rec + 3u + r] = uvec4(in_data[at + 4u * r], in_data[at + 4u * r + 1u],
-                                            in_data[at + 4u * r + 2u], in_data[at + 4u * r + 3u]);
+            dst_slots[rec + 3u + r] = uvec4(0u);
+            if (given)
+                dst_slots[rec + 3u + r] = uvec4(in_data[at + 4u * r], in_data[at + 4u * r + 1u],
+                                                in_data[at + 4u * r + 2u], in_data[at + 4u * r + 3u]);
         }
         dst_slots[rec + 6u] = uvec4(active_ ? base_lo : 0u, active_ ? base_hi : 0u, id_mask, sbt_flags);
         bool identity = m[0] == vec4(1.0, 0.0, 0.0, 0.0) && m[1] == vec4(0.0, 1.0, 0.0, 0.0) &&

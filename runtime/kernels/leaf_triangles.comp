@@ -10,7 +10,7 @@ void main() {
     bool in_range = i < p.count;
     vec3 v0 = vec3(0.0), v1 = vec3(0.0), v2 = vec3(0.0);
     bool active_ = false;
-    if (in_range) {
+    if (in_range && in_range_of_geometry(i)) {
         read_triangle(i, v0, v1, v2);
         active_ = triangle_active(v0, v1, v2);
     }

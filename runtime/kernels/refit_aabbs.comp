@@ -11,6 +11,10 @@ void main() {
     if (((dst_slots[at + 1u].w ^ p.geometry) & RTC_SLOT_GEOMETRY_MASK) != 0u) return;
     uint prim = dst_slots[at].w - p.primitive_base;
     if (prim >= p.count) return;
+    if (!in_range_of_geometry(prim)) {
+        changed_activity(p.first + prim);
+        return;
+    }
     vec3 lo, hi;
     read_aabb(prim, lo, hi);
     dst_slots[at].xyz = floatBitsToUint(lo);

@@ -13,6 +13,10 @@ void main() {
     if (((dst_slots[at + 1u].w ^ p.geometry) & RTC_SLOT_GEOMETRY_MASK) != 0u) return;
     uint prim = dst_slots[at].w - p.primitive_base;
     if (prim >= p.count) return;
+    if (!in_range_of_geometry(prim)) {
+        changed_activity(p.first + prim);
+        return;
+    }
     vec3 v0, v1, v2;
     read_triangle(prim, v0, v1, v2);
     dst_slots[at].xyz = floatBitsToUint(v0);
