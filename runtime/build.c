@@ -263,6 +263,10 @@ VkResult rtrCmdBuildAccelerationStructures(RtrRecorder recorder, uint32_t count,
     for (i = 0; i < count && r == VK_SUCCESS; i++) r = prepare(&builds[i], recorder, &infos[i]);
     if (r == VK_SUCCESS && count > 1) r = check_overlap(recorder, builds, count);
     if (r == VK_SUCCESS) r = record_together(recorder, builds, count, false);
+    /* In a heap top levels read bottom levels through a binding of all of it, and write to it:
+     * nobody but us knows that it is not the same part. */
+    for (i = 0; i < count && r == VK_SUCCESS; i++)
+        if (builds[i].dst->heap) r = record_together(recorder, &builds[i], 1, true);
     if (r == VK_SUCCESS) r = record_together(recorder, builds, count, true);
     for (i = 0; i < count && r == VK_SUCCESS; i++) r = remember(&builds[i]);
     if (count > 1) rtr_free(a, builds);

@@ -477,7 +477,7 @@ typedef struct RtrAccelerationStructureBuildInfo {
 
 /* Any number of builds and updates in one call, with a barrier a phase for all of them instead of
  * each its own: many small ones then fill a device. First the bottom levels, then the top levels,
- * which may refer to them. Each needs scratch of its own. Otherwise as
+ * which may refer to them (those in a heap one after the other). Each needs scratch of its own. Otherwise as
  * rtrCmdBuildAccelerationStructure. What an indirect build leaves out counts as inactive: an update
  * has the same largest counts and the same primitives. The time of an indirect build is that of the
  * largest counts.
