@@ -7,6 +7,7 @@ Every expected value is computed here, by reasoning from the specification, neve
 import json
 import os
 import struct
+import subprocess
 
 CASES = {}  # "group/name" -> case
 
@@ -64,13 +65,16 @@ def expect(cell, at, values, type="u32", rel=0.0, abs=0.0, binding="0.1", native
 
 
 def case(name, stages, expects, section="", scene=None, size=(1, 1, 1), words=64, **more):
-    """stages: {"rgen": source, "rchit": source, "rchit:second": source, ...} in order."""
+    """stages: {"rgen": source, "rchit": source, "rchit:second": source, ...} in order; {"assembly": FILE} is SPIR-V of cases/."""
     assert name not in CASES, name
     out = {"name": name, "section": section, "stages": [], "size": list(size)}
     for key, source in stages.items():
         stage, _, label = key.partition(":")
         entry = {"stage": stage, "name": label or stage}
-        if isinstance(source, dict):
+        if isinstance(source, dict) and "assembly" in source:
+            entry.update(source)
+            entry["file"] = name.split("/")[-1] + "." + stage + ".spv"
+        elif isinstance(source, dict):
             entry.update(source)
             entry["source"] = entry["source"].rstrip("\n").split("\n")
         else:
@@ -110,6 +114,11 @@ def write(folder):
     for name, content in CASES.items():
         path = os.path.join(folder, name + ".json")
         os.makedirs(os.path.dirname(path), exist_ok=True)
+        for stage in content["stages"]:
+            if "assembly" in stage:
+                assembly = os.path.join(os.path.dirname(os.path.abspath(__file__)), "cases", stage.pop("assembly"))
+                subprocess.run(["spirv-as", "--preserve-numeric-ids", "--target-env", "spv1.3", assembly, "-o",
+                                os.path.join(os.path.dirname(path), stage["file"])], check=True)
         text = json.dumps(content, indent=1) + "\n"
         names.add(os.path.abspath(path))
         if not os.path.exists(path) or open(path).read() != text:
