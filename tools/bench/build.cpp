@@ -21,7 +21,8 @@ using Kind = native::Requirements::Kind;
 struct Options {
     std::vector<size_t> sizes{1000, 3000, 10000, 30000, 100000, 300000, 1000000, 2000000, 4000000};
     std::vector<std::string> meshes{"blob"}, native{"auto"}, modes{"trace", "fast", "memory", "update"};
-    uint32_t instances = 10000;
+    uint32_t instances = 10000, batch = 0;
+    size_t batch_triangles = 1000;
     int repeats = 9;
     double seconds = 6;  // of one row, once it has three timings
     std::string device, json_file, markdown_file, svg_file;
@@ -72,6 +73,15 @@ class Bench {
             input.instances = make_instances(options_.instances);
             run_modes("instances", input);
         }
+        if (options_.batch) {
+            BuildInput input;
+            input.mesh = make_blob(options_.batch_triangles);
+            input.copies = options_.batch;
+            for (bool together : {false, true}) {
+                input.together = together;
+                run_row(std::to_string(options_.batch) + " blobs", together ? "in one call" : "one by one", input);
+            }
+        }
         std::printf("%s", build_table(report_).c_str());
         write_files();
         device_.context->require_silent_validation();
@@ -110,16 +120,17 @@ class Bench {
             row.mode = mode;
             row.by = by;
             row.top = !input.instances.empty();
-            row.primitives = row.top ? input.instances.size() : input.mesh.triangle_count();
+            row.primitives = row.top ? input.instances.size() : input.mesh.triangle_count() * input.copies;
             report_.rows.push_back(row);
             try {
                 Entry entry{make(), report_.rows.size() - 1};
                 time(*entry.subject, false);
                 BuildRow& made = report_.rows.back();
-                made.bytes = double(entry.subject->bytes);
+                made.bytes = double(entry.subject->bytes) * input.copies;
                 made.scratch = double(input.allow_update ? entry.subject->update_scratch_bytes
-                                                         : entry.subject->scratch_bytes);
-                made.compacted = double(entry.subject->compacted_bytes());
+                                                         : entry.subject->scratch_bytes) *
+                               input.copies;
+                made.compacted = double(entry.subject->compacted_bytes()) * input.copies;
                 entries.push_back(std::move(entry));
             } catch (const std::exception& problem) {
                 report_.rows.back().error = problem.what();
@@ -129,6 +140,7 @@ class Bench {
         add("rtc", [&] { return make_rtc_subject(*device_.rtc, input); });
         for (Kind kind : device_.kinds)
             add(kind == Kind::Khr ? "native KHR" : "native NV", [&] {
+                if (kind != Kind::Khr && input.copies > 1) throw Error("builds of one call are KHR's");
                 return kind == Kind::Khr ? make_khr_subject(*device_.context, input)
                                          : make_nv_subject(*device_.context, input);
             });
@@ -181,6 +193,9 @@ void add_build_command(CLI::App& app) {
         ->check(CLI::IsMember({"trace", "fast", "memory", "update"}))
         ->capture_default_str();
     build.add_option("--instances", options->instances, "of the top level; 0: none")->capture_default_str();
+    build.add_option("--batch", options->batch, "blobs that are built one by one and in one call; 0: none")
+        ->capture_default_str();
+    build.add_option("--batch-triangles", options->batch_triangles, "of each of them")->capture_default_str();
     build.add_option("--native", options->native, "of nv, khr; or auto, none")
         ->delimiter(',')
         ->check(CLI::IsMember({"nv", "khr", "auto", "none"}))

@@ -15,6 +15,9 @@ struct BuildInput {
     tools::Mesh mesh;
     // Not empty: instances of the mesh, and the top level over them is what is measured.
     std::vector<glm::mat4> instances;
+    // Bottom levels of the mesh, all built each time: in one call, or one after the other.
+    uint32_t copies = 1;
+    bool together = false;
     bool fast_build = false, low_memory = false, allow_update = false;
 };
 

@@ -72,6 +72,13 @@ class KhrSubject final : public BuildSubject {
         bottom_.range.primitiveCount = uint32_t(input.mesh.triangle_count());
         make(bottom_, VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_KHR, input);
         measured_ = &bottom_;
+        together_ = input.together;
+        for (uint32_t i = 1; i < input.copies; ++i) {
+            Level& level = *more_.emplace_back(std::make_unique<Level>());
+            level.geometry = bottom_.geometry;
+            level.range = bottom_.range;
+            make(level, VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_KHR, input);
+        }
         if (input.instances.empty()) return;
         context.run([&](VkCommandBuffer commands) { record(commands, bottom_, false); });
         VkAccelerationStructureDeviceAddressInfoKHR info{
@@ -88,9 +95,24 @@ class KhrSubject final : public BuildSubject {
 
     ~KhrSubject() override {
         for (const Level* level : {&top_, &bottom_}) destroy_(context_.device, level->structure, nullptr);
+        for (const auto& level : more_) destroy_(context_.device, level->structure, nullptr);
     }
 
-    void record_build(VkCommandBuffer commands) override { record(commands, *measured_, false); }
+    void record_build(VkCommandBuffer commands) override {
+        if (!together_) {
+            record(commands, *measured_, false);
+            for (const auto& level : more_) record(commands, *level, false);
+            return;
+        }
+        std::vector<VkAccelerationStructureBuildGeometryInfoKHR> infos{measured_->info};
+        std::vector<const VkAccelerationStructureBuildRangeInfoKHR*> ranges{&measured_->range};
+        for (const auto& level : more_) {
+            infos.push_back(level->info);
+            ranges.push_back(&level->range);
+        }
+        build_(commands, uint32_t(infos.size()), infos.data(), ranges.data());
+        tools::full_barrier(commands);
+    }
     void record_update(VkCommandBuffer commands) override { record(commands, *measured_, true); }
 
     VkDeviceSize compacted_bytes() override {
@@ -165,6 +187,8 @@ class KhrSubject final : public BuildSubject {
     PFN_vkCmdWriteAccelerationStructuresPropertiesKHR properties_;
     Buffer positions_, indices_, instances_;
     Level bottom_, top_;
+    std::vector<std::unique_ptr<Level>> more_;  // the other copies
+    bool together_ = false;
     Level* measured_ = nullptr;
 };
 

@@ -46,7 +46,9 @@ class RtcSubject final : public BuildSubject {
         info_.type = VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_NV;
         info_.geometryCount = 1;
         info_.pGeometries = &geometry_;
-        structures_.push_back(create());
+        for (uint32_t i = 0; i < input.copies; ++i) structures_.push_back(create());
+        together_ = input.together;
+        copies_ = input.copies;
         if (!input.instances.empty()) {
             bottom_info_ = info_;
             info_.type = VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV;
@@ -61,7 +63,7 @@ class RtcSubject final : public BuildSubject {
         context.run([&](VkCommandBuffer commands) {
             device.check(rtrBeginRecorder(recorder_, commands), "rtrBeginRecorder");
             device.check(rtrCmdInitializeHeap(recorder_, heap_), "rtrCmdInitializeHeap");
-            if (structures_.size() > 1)
+            if (info_.type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV)
                 device.check(rtrCmdBuildAccelerationStructure(recorder_, &bottom_info_, VK_NULL_HANDLE, 0, VK_FALSE,
                                                               structures_[0], nullptr, scratch_.handle, 0),
                              "rtrCmdBuildAccelerationStructure");
@@ -118,7 +120,8 @@ class RtcSubject final : public BuildSubject {
                                             VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_UPDATE_SCRATCH_NV);
             scratch_size = std::max({scratch_size, scratch_bytes, update_scratch_bytes});
         }
-        scratch_ = Buffer(device_.context, scratch_size, RTR_SCRATCH_BUFFER_USAGE, MemoryKind::Device);
+        scratch_stride_ = scratch_size;
+        scratch_ = Buffer(device_.context, scratch_size * copies_, RTR_SCRATCH_BUFFER_USAGE, MemoryKind::Device);
         heap_buffer_ = Buffer(device_.context, heap_size + kAlign, RTR_HEAP_BUFFER_USAGE, MemoryKind::Device);
         RtrHeapCreateInfo heap_info{};
         heap_info.buffer = heap_buffer_.handle;
@@ -156,9 +159,21 @@ class RtcSubject final : public BuildSubject {
     void record(VkCommandBuffer commands, VkBool32 update) {
         retire();
         device_.check(rtrBeginRecorder(recorder_, commands), "rtrBeginRecorder");
-        device_.check(rtrCmdBuildAccelerationStructure(recorder_, &info_, instances_.handle, 0, update,
-                                                       structures_.back(), nullptr, scratch_.handle, 0),
-                      "rtrCmdBuildAccelerationStructure");
+        std::vector<RtrAccelerationStructureBuildInfo> builds;
+        for (uint32_t i = 0; i < copies_; ++i) {
+            RtrAccelerationStructureBuildInfo build{};
+            build.pInfo = &info_;
+            build.instanceData = instances_.handle;
+            build.update = update;
+            build.dst = copies_ > 1 ? structures_[i] : structures_.back();
+            build.scratch = scratch_.handle;
+            build.scratchOffset = i * scratch_stride_;
+            builds.push_back(build);
+        }
+        const uint32_t each = together_ ? copies_ : 1;
+        for (uint32_t i = 0; i < copies_; i += each)
+            device_.check(rtrCmdBuildAccelerationStructures(recorder_, each, &builds[i]),
+                          "rtrCmdBuildAccelerationStructures");
     }
 
     // Everything recorded before has been waited for.
@@ -169,6 +184,9 @@ class RtcSubject final : public BuildSubject {
     VkGeometryNV geometry_{};
     VkAccelerationStructureInfoNV info_{}, bottom_info_{};
     std::vector<RtrAccelerationStructure> structures_;
+    VkDeviceSize scratch_stride_ = 0;
+    uint32_t copies_ = 1;
+    bool together_ = false;
     RtrHeap heap_ = nullptr;
     RtrRecorder recorder_ = nullptr;
 };
