@@ -9,6 +9,12 @@ static void place(RtrScratchLayout* l, uint32_t array, VkDeviceSize size) {
     l->total += l->size[array];
 }
 
+/* In the place of an array that is not used at the same time. */
+static void share(RtrScratchLayout* l, uint32_t array, uint32_t with, VkDeviceSize size) {
+    l->offset[array] = l->offset[with];
+    l->size[array] = rtr_align(size ? size : 256, 256);
+}
+
 /* Words of ranges of indirect builds; a top level has one. */
 static VkDeviceSize range_words(uint32_t geometries) { return RTR_RANGE_WORDS * (VkDeviceSize)(geometries ? geometries : 1); }
 
@@ -22,11 +28,12 @@ void rtr_build_scratch(uint32_t n, uint32_t geometries, RtrScratchLayout* l) {
     place(l, RTR_ARR_NODE_BOX, 32ull * n);
     place(l, RTR_ARR_INFO, 16ull * n);
     place(l, RTR_ARR_PAIRS_A, 8ull * n);
-    place(l, RTR_ARR_PAIRS_B, 8ull * n);
     place(l, RTR_ARR_LINKS, 8ull * n);
     place(l, RTR_ARR_MARKS, 4ull * n);
-    place(l, RTR_ARR_OUT, 4ull * n);
     place(l, RTR_ARR_SLOT_OF, 4ull * n);
+    /* The sort is over before there are nodes, the fitting before they are numbered. */
+    share(l, RTR_ARR_PAIRS_B, RTR_ARR_NODE_BOX, 8ull * n);
+    share(l, RTR_ARR_OUT, RTR_ARR_MARKS, 4ull * n);
 }
 
 uint32_t rtr_most_nodes(const struct RtrAccelerationStructure_T* as) {
@@ -161,6 +168,7 @@ static VkResult prepare(RtrBuild* b, RtrRecorder recorder, const RtrAcceleration
     b->push.geometry_count = info->geometryCount;
     if (dst->type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV) b->push.flags |= RTR_BUILD_TOP;
     if (b->update) b->push.flags |= RTR_BUILD_UPDATE;
+    if (info->flags & VK_BUILD_ACCELERATION_STRUCTURE_LOW_MEMORY_BIT_NV) b->push.flags |= RTR_BUILD_LOW_MEMORY;
     if (info->geometryCount && info->pGeometries[0].geometryType == VK_GEOMETRY_TYPE_AABBS_NV)
         b->push.flags |= RTR_BUILD_AABBS;
     if (info->flags & VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV)

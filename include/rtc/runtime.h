@@ -432,7 +432,8 @@ RTR_API VkResult rtrResetRecorder(RtrRecorder recorder);
  * writes of `dst` and scratch happen in COMPUTE_SHADER with SHADER_READ / SHADER_WRITE
  * (rtrTranslatePipelineStages/Access of the NV masks say the same).
  * PREFER_FAST_BUILD takes a Morton tree as it is; otherwise three passes of rotations bring
- * it near a SAH tree.
+ * it near a SAH tree. LOW_MEMORY fills leaves, whether or not that makes tracing cheaper: the
+ * compacted size is smaller by 12 to 22 percent, that of the object and of scratch stays.
  * An update may move vertices, boxes and instances, nothing else: geometries, their types,
  * flags, formats and counts, and which primitives are active (for instances: a reference that is
  * not 0, a transform that can be inverted) stay. It is compared with the build of `src` recorded

@@ -81,6 +81,7 @@
 #define RTR_BUILD_TOP 1u
 #define RTR_BUILD_AABBS 2u
 #define RTR_BUILD_KEEP_DEGENERATE 4u /* ALLOW_UPDATE: only NaN drops a primitive */
+#define RTR_BUILD_LOW_MEMORY 8u      /* as few nodes as leaves allow */
 #define RTR_BUILD_HAS_TRANSFORM 16u
 #define RTR_BUILD_UPDATE 64u
 #define RTR_BUILD_COUNTED 128u /* an update that counted the active primitives */

@@ -87,6 +87,26 @@ TEST_P(CopyTest, CompactKeepsTheTree) {
     }
 }
 
+// Fewer nodes, and so fewer bytes, of the same primitives; with either builder.
+TEST_P(CopyTest, LowMemoryCompactsToLess) {
+    for (auto builder : {0, int(VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_BUILD_BIT_NV)}) {
+        Scene scene(*vk, rtr, 8 << 20, GetParam());
+        const std::vector<VkGeometryNV> geometry{scene.triangles(ball(5000, 3, 1))};
+        VkDeviceSize sizes[2];
+        TreeFacts facts[2];
+        for (int low : {0, 1}) {
+            int flags = builder | (low ? int(VK_BUILD_ACCELERATION_STRUCTURE_LOW_MEMORY_BIT_NV) : 0);
+            auto as = scene.build_bottom(geometry, static_cast<VkBuildAccelerationStructureFlagsNV>(flags));
+            check_structure(scene, as, facts[low]);
+            sizes[low] = compacted_size(scene, as);
+            EXPECT_LE(scene.scratch_size(as), 5000u * 105 + 4096);
+        }
+        EXPECT_LT(facts[1].nodes, facts[0].nodes);
+        EXPECT_LT(static_cast<double>(sizes[1]), 0.95 * static_cast<double>(sizes[0]));
+        EXPECT_EQ(facts[1].slots.size(), 5000u);
+    }
+}
+
 TEST_P(CopyTest, RefitFollowsTheVertices) {
     for (bool in_place : {true, false}) {
         for (auto extra : {0, int(VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_BUILD_BIT_NV)}) {

@@ -1,6 +1,9 @@
 // Host allocations go where the application sends them; recorders of several threads do
 // not disturb each other; misuse of objects is named.
+#include <cstdio>
 #include <cstdlib>
+#include <fstream>
+#include <iterator>
 #include <map>
 #include <mutex>
 #include <thread>
@@ -56,6 +59,82 @@ class Counter {
 };
 
 class LifetimeTest : public RuntimeTest {};
+
+// Every kernel goes through the application's pipeline cache, and a device is made from a cache
+// that was kept in a file.
+PFN_vkGetDeviceProcAddr real_device_proc;
+PFN_vkGetInstanceProcAddr real_instance_proc;
+PFN_vkCreateComputePipelines real_create;
+VkPipelineCache expected_cache;
+int created, cached;
+VKAPI_ATTR VkResult VKAPI_CALL watch_create(VkDevice device, VkPipelineCache cache, uint32_t count,
+                                            const VkComputePipelineCreateInfo* infos, const VkAllocationCallbacks* a,
+                                            VkPipeline* out) {
+    created++;
+    cached += cache == expected_cache;
+    return real_create(device, cache, count, infos, a, out);
+}
+VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL watched_device_proc(VkDevice device, const char* name) {
+    auto f = real_device_proc(device, name);
+    if (strcmp(name, "vkCreateComputePipelines") != 0) return f;
+    real_create = reinterpret_cast<PFN_vkCreateComputePipelines>(f);
+    return reinterpret_cast<PFN_vkVoidFunction>(watch_create);
+}
+VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL watched_instance_proc(VkInstance instance, const char* name) {
+    auto f = real_instance_proc(instance, name);
+    if (strcmp(name, "vkGetDeviceProcAddr") != 0) return f;
+    real_device_proc = reinterpret_cast<PFN_vkGetDeviceProcAddr>(f);
+    return reinterpret_cast<PFN_vkVoidFunction>(watched_device_proc);
+}
+
+TEST_F(LifetimeTest, KernelsComeBackFromACacheOnDisk) {
+    auto find = [&](const char* name) { return vk->get_instance_proc_addr(vk->instance, name); };
+    auto create = reinterpret_cast<PFN_vkCreatePipelineCache>(find("vkCreatePipelineCache"));
+    auto destroy = reinterpret_cast<PFN_vkDestroyPipelineCache>(find("vkDestroyPipelineCache"));
+    auto get = reinterpret_cast<PFN_vkGetPipelineCacheData>(find("vkGetPipelineCacheData"));
+    real_instance_proc = vk->get_instance_proc_addr;
+    const std::string file = testing::TempDir() + "rtr_kernels.cache";
+    std::vector<char> data;
+    for (bool again : {false, true}) {
+        VkPipelineCacheCreateInfo cache_info{VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO};
+        if (again) {
+            std::ifstream in(file, std::ios::binary);
+            data.assign(std::istreambuf_iterator<char>(in), {});
+            cache_info.initialDataSize = data.size();
+            cache_info.pInitialData = data.data();
+        }
+        ASSERT_EQ(create(vk->device, &cache_info, nullptr, &expected_cache), VK_SUCCESS);
+        RtrDeviceCreateInfo info{};
+        info.instance = vk->instance;
+        info.physicalDevice = vk->physical_device;
+        info.device = vk->device;
+        info.pfnGetInstanceProcAddr = watched_instance_proc;
+        info.pipelineCache = expected_cache;
+        created = cached = 0;
+        RtrDevice device = nullptr;
+        ASSERT_EQ(rtrCreateDevice(&info, nullptr, &device), VK_SUCCESS);
+        EXPECT_GT(created, 20);
+        EXPECT_EQ(cached, created);
+        {
+            Scene scene(*vk, device, 1 << 20);
+            auto bottom = scene.build_bottom({scene.triangles({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {2, 0, 0}, {3, 0, 0}, {2, 1, 0}})});
+            auto top = scene.build_top({scene.instance(bottom)});
+            TreeFacts facts, top_facts;
+            check_structure(scene, bottom, facts);
+            check_structure(scene, top, top_facts);
+            EXPECT_EQ(facts.slots.size(), 2u);
+        }
+        rtrDestroyDevice(device, nullptr);
+        size_t size = 0;
+        ASSERT_EQ(get(vk->device, expected_cache, &size, nullptr), VK_SUCCESS);
+        data.resize(size);
+        ASSERT_EQ(get(vk->device, expected_cache, &size, data.data()), VK_SUCCESS);
+        EXPECT_GE(size, 32u);
+        std::ofstream(file, std::ios::binary).write(data.data(), static_cast<std::streamsize>(size));
+        destroy(vk->device, expected_cache, nullptr);
+    }
+    std::remove(file.c_str());
+}
 
 TEST_F(LifetimeTest, AllocationsGoThroughTheCallbacks) {
     Counter device_counter, object_counter;
