@@ -175,11 +175,13 @@ VkResult rtrCreateAccelerationStructure(RtrDevice d, const VkAccelerationStructu
     }
     as->compacted_size = info->compactedSize;
     if (info->compactedSize) {
-        as->size = rtr_align(info->compactedSize, RTC_QUAD_BYTES);
+        as->size = info->compactedSize;
     } else {
         as->size = RTC_QUAD_BYTES * (rtr_slots_quad(as->primitive_count) +
                                      (VkDeviceSize)rtr_slot_quads(as) * as->primitive_count);
     }
+    /* All that its memory requirements ask for: structures of the same requirements are clones' equals. */
+    as->size = rtr_align(as->size, RTC_AS_ALIGNMENT);
     *pAs = as;
     return VK_SUCCESS;
 }

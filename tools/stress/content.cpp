@@ -162,15 +162,15 @@ void fill_vertices(Geometry& g, Random& random, const Space& s, int kind, uint32
     }
 }
 
-void make_triangles(Geometry& g, Random& random, uint64_t most) {
+void make_triangles(Geometry& g, Random& random, uint64_t most, bool large) {
     const Format& f = kFormats[chance(random, 0.6) ? 0 : below(random, std::size(kFormats))];
     g.format = f.format;
     g.vertex_error = f.snorm ? 4 : 0;
     const uint32_t align = f.component_bytes;
     g.stride = vertex_bytes(f) + uint32_t(below(random, 3)) * align;
     g.offset = uint32_t(below(random, 4)) * align;
-    int kind = int(below(random, 3));
-    uint64_t count = log_uniform(random, most);
+    int kind = int(below(random, large ? 2 : 3));
+    uint64_t count = large ? uint64_t(between(random, 0.5, 1) * double(most)) : log_uniform(random, most);
     if (kind == 2) count = std::min<uint64_t>(count, 300);  // they all overlap
     uint32_t side = 1;
     if (kind == 0) {
@@ -268,16 +268,17 @@ size_t Content::primitives() const {
     return count;
 }
 
-Content make_content(Random& random, uint64_t most) {
+Content make_content(Random& random, uint64_t most, bool large) {
     Content content;
-    content.boxes = chance(random, 0.25);
-    content.geometries.resize(below(random, 7));
+    content.boxes = chance(random, 0.25) && !large;
+    content.geometries.resize(below(random, 7) + large);
     uint64_t left = most;
     for (Geometry& g : content.geometries) {
         if (content.boxes) {
             make_boxes(g, random, std::min<uint64_t>(left, most / 4));
         } else {
-            make_triangles(g, random, left);
+            make_triangles(g, random, left, large);
+            large = false;
         }
         left -= std::min<uint64_t>(left, g.primitives());
         if (chance(random, 0.5)) g.flags |= VK_GEOMETRY_OPAQUE_BIT_NV;

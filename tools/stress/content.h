@@ -52,8 +52,8 @@ struct Content {
     size_t primitives() const;
 };
 
-// Up to `most` primitives in 0 to 6 geometries of one kind.
-Content make_content(Random& random, uint64_t most);
+// Up to `most` primitives in 0 to 6 geometries of one kind; `large`: more than half of them in one of triangles.
+Content make_content(Random& random, uint64_t most, bool large = false);
 // Other vertices or boxes, with all that an update must leave as it is: counts, formats, flags, indices and
 // which primitives are inactive.
 void move_content(Content& content, Random& random);

@@ -132,6 +132,9 @@ int main(int argc, char** argv) {
     app.add_option("--steps", options.steps, "steps of each seed");
     app.add_option("--max-primitives", options.limits.primitives, "of all bottom levels together");
     app.add_option("--max-instances", options.limits.instances, "of the top level");
+    app.add_option("--large", options.limits.large,
+                   "share of new bottom levels that take more than half of the primitives left")
+        ->check(CLI::Range(0.0, 1.0));
     app.add_option("--rays", options.limits.rays, "of a step")->check(CLI::Range(1u, stress::kMostRays));
     app.add_option(
         "--brute", options.limits.brute_tests,

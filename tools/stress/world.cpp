@@ -319,7 +319,8 @@ void World::add_bottom() {
     const uint64_t used = primitives();
     const uint64_t most = limits_.primitives > used ? limits_.primitives - used : 0;
     Bottom bottom;
-    bottom.content = make_content(random_, log_uniform(random_, most));
+    const bool large = limits_.large > 0 && chance(random_, limits_.large);
+    bottom.content = make_content(random_, large ? most : log_uniform(random_, most), large);
     bottom.flags = random_flags(random_);
     const Inputs inputs(device_.context, bottom.content);
     VkAccelerationStructureInfoNV info = info_of(kBottom, bottom.flags);
@@ -339,7 +340,7 @@ void World::change_bottom() {
     auto chosen = std::next(bottoms_.begin(), long(below(random_, bottoms_.size())));
     Bottom& b = chosen->second;
     in_use_ = chosen->first;
-    const bool updatable = (b.flags & VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV) && !b.copied;
+    const bool updatable = b.flags & VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV;
     switch (below(random_, 8)) {
         case 0:
         case 1:
@@ -472,7 +473,7 @@ void World::record_top(const VkAccelerationStructureInfoNV& info, const Buffer& 
 
 // May the present top level be updated? Its instances must stay active or inactive as they are.
 bool World::top_updatable() const {
-    if (!top_ || top_->copied || !(top_->flags & VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV))
+    if (!top_ || !(top_->flags & VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV))
         return false;
     for (size_t i = 0; i < top_->bottoms.size(); ++i) {
         if (top_->bottoms[i] < 0) continue;

@@ -16,6 +16,7 @@ namespace rtc::stress {
 struct Limits {
     uint64_t primitives = 2000000;  // of all bottom levels
     uint64_t instances = 100000;
+    double large = 0;      // share of new bottom levels that take all the primitives there may be
     uint32_t rays = 256;  // of a trace
     uint64_t brute_tests =
         20000000;  // a step whose rays need no more is checked without the reference's tree
@@ -56,7 +57,7 @@ class World {
         std::unique_ptr<BottomReference> reference;
         VkBuildAccelerationStructureFlagsNV flags = 0;
         Structure structure;
-        bool copied = false;  // made by a copy: its counts are unknown to the runtime, so it is never updated
+        bool copied = false;  // made by a copy, for which no counts were given: it is not built again, only updated
         uint32_t first_record = 0;
     };
     struct Top {

@@ -100,6 +100,19 @@ TEST_P(UpdateTest, CompactedStructures) {
     expect_vertices(clone_facts, vertices);
     check_structure(scene, small, small_facts);
     expect_vertices(small_facts, moved);
+    // A clone made with all the bytes that the requirements of its source name is no larger than its source.
+    VkMemoryRequirements2 need{VK_STRUCTURE_TYPE_MEMORY_REQUIREMENTS_2};
+    rtrGetAccelerationStructureMemoryRequirements(
+        rtr, VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_OBJECT_NV, full, &need);
+    auto blank = bottom(geometry);
+    blank.geometryCount = 0;
+    auto clone = scene.create(blank, need.memoryRequirements.size);
+    scene.run([&] {
+        EXPECT_EQ(rtrCmdCopyAccelerationStructure(scene.recorder, clone, full,
+                                                  VK_COPY_ACCELERATION_STRUCTURE_MODE_CLONE_NV),
+                  VK_SUCCESS);
+    });
+    update(scene, bottom(third), {}, full, clone);
     // The counts are known of a compacted structure too.
     second[0].geometry.triangles.vertexCount -= 3;
     scene.run([&] { EXPECT_EQ(record(scene, bottom(second), {}, small, nullptr), VK_ERROR_VALIDATION_FAILED_EXT); });
