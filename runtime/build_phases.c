@@ -107,9 +107,8 @@ enum {
     NUMBER_COUNT,
     NUMBER_SCAN,
     NUMBER,
-    NODES,
-    SLOTS,
-    HEADER
+    NODES, /* and the header */
+    SLOTS
 };
 
 static VkResult leaves(RtrBuild* b) {
@@ -148,24 +147,8 @@ static VkResult number(RtrBuild* b) {
     static const RtrKernel kernels[3] = {RTR_KERNEL_number_count, RTR_KERNEL_number_scan, RTR_KERNEL_number};
     const uint32_t step = b->phase++ - NUMBER_COUNT;
     b->push.blocks = rtr_groups(b->primitives, RTR_SCAN_BLOCK);
+    if (b->push.blocks == 1 && step < 2) return VK_SUCCESS;
     return rtr_dispatch_whole(b, kernels[step], step == 1 ? 1 : b->push.blocks);
-}
-
-/* A window of the nodes. */
-static VkResult nodes(RtrBuild* b) {
-    const uint32_t groups = rtr_groups(b->primitives, RTR_GROUP);
-    VkResult r;
-    if (b->window >= rtr_node_room(b->primitives)) {
-        b->window = 0;
-        b->phase++;
-        return VK_SUCCESS;
-    }
-    if ((r = rtr_bind_arrays(b, b->window, 0)) != VK_SUCCESS) return r;
-    b->push.window_first = b->window;
-    b->push.window_count = b->node_window;
-    rtr_dispatch(b, RTR_KERNEL_encode_nodes, groups ? groups : 1);
-    b->window += b->node_window;
-    return VK_SUCCESS;
 }
 
 /* A piece of the input into a window of the slots. */
@@ -173,7 +156,7 @@ static VkResult slots(RtrBuild* b) {
     bool more;
     VkResult r;
     if (b->push.flags & RTR_BUILD_TOP || b->window >= b->primitives) {
-        b->phase++;
+        b->done = true;
         return VK_SUCCESS;
     }
     if ((r = rtr_next_input(b, &more)) != VK_SUCCESS) return r;
@@ -189,6 +172,22 @@ static VkResult slots(RtrBuild* b) {
     return VK_SUCCESS;
 }
 
+/* A window of the nodes. */
+static VkResult nodes(RtrBuild* b) {
+    const uint32_t groups = rtr_groups(b->primitives, RTR_GROUP);
+    VkResult r = VK_SUCCESS;
+    if (b->window == 0) r = rtr_dispatch_whole(b, RTR_KERNEL_header, 1);
+    if (r != VK_SUCCESS || (r = rtr_bind_arrays(b, b->window, 0)) != VK_SUCCESS) return r;
+    b->push.window_first = b->window;
+    b->push.window_count = b->node_window;
+    rtr_dispatch(b, RTR_KERNEL_encode_nodes, groups ? groups : 1);
+    b->window += b->node_window;
+    if (b->window < rtr_node_room(b->primitives)) return VK_SUCCESS;
+    b->window = 0;
+    b->phase++;
+    return slots(b); /* they need nothing of the nodes */
+}
+
 VkResult rtr_record_build_phase(RtrBuild* b) {
     if (!b->primitives && b->phase >= MORTON && b->phase < NODES) b->phase = NODES;
     if (b->phase == INIT) {
@@ -200,6 +199,10 @@ VkResult rtr_record_build_phase(RtrBuild* b) {
         return rtr_load_ranges(b);
     }
     if (b->phase == LEAVES) return leaves(b);
+    if (b->phase == MORTON && b->primitives <= RTR_SORT_SMALL) {
+        b->phase = TOPOLOGY;
+        return rtr_dispatch_whole(b, RTR_KERNEL_sort_small, 1);
+    }
     if (b->phase == MORTON) {
         b->phase++;
         return rtr_dispatch_whole(b, RTR_KERNEL_morton, rtr_groups(b->primitives, RTR_GROUP));
@@ -208,7 +211,5 @@ VkResult rtr_record_build_phase(RtrBuild* b) {
     if (b->phase < NUMBER_COUNT) return fit(b);
     if (b->phase < NODES) return number(b);
     if (b->phase == NODES) return nodes(b);
-    if (b->phase == SLOTS) return slots(b);
-    b->done = true;
-    return rtr_dispatch_whole(b, RTR_KERNEL_header, 1);
+    return slots(b);
 }

@@ -81,6 +81,7 @@ RtrGetBufferDeviceAddress rtr_load_buffer_device_address(const RtrInstanceTable*
     X(sort_count)       \
     X(sort_scan)        \
     X(sort_scatter)     \
+    X(sort_small)       \
     X(lbvh_topology)    \
     X(lbvh_fit)         \
     X(number_count)     \

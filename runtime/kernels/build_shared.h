@@ -60,6 +60,7 @@
 #define RTR_SORT_BLOCK (RTR_GROUP * RTR_SORT_ITEMS)
 #define RTR_SORT_BITS 4u
 #define RTR_SORT_BINS 16u
+#define RTR_SORT_SMALL 4096u /* primitives that one workgroup sorts */
 #define RTR_SCAN_ITEMS 8u
 #define RTR_SCAN_BLOCK (RTR_GROUP * RTR_SCAN_ITEMS)
 

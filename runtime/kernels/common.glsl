@@ -28,8 +28,8 @@ layout(set = 1, binding = RTR_ARR_STATE, std430) RTR_COHERENT buffer State { uin
 layout(set = 1, binding = RTR_ARR_LEAF_BOX, std430) buffer LeafBox { vec4 leaf_box[]; };
 layout(set = 1, binding = RTR_ARR_NODE_BOX, std430) RTR_COHERENT buffer NodeBox { vec4 node_box[]; };
 layout(set = 1, binding = RTR_ARR_INFO, std430) RTR_COHERENT buffer Info { uvec4 info[]; };
-layout(set = 1, binding = RTR_ARR_PAIRS_A, std430) buffer PairsA { uvec2 pairs_a[]; };
-layout(set = 1, binding = RTR_ARR_PAIRS_B, std430) buffer PairsB { uvec2 pairs_b[]; };
+layout(set = 1, binding = RTR_ARR_PAIRS_A, std430) RTR_COHERENT buffer PairsA { uvec2 pairs_a[]; };
+layout(set = 1, binding = RTR_ARR_PAIRS_B, std430) RTR_COHERENT buffer PairsB { uvec2 pairs_b[]; };
 layout(set = 1, binding = RTR_ARR_LINKS, std430) RTR_COHERENT buffer Links { uint links[]; };
 layout(set = 1, binding = RTR_ARR_MARKS, std430) RTR_COHERENT buffer Marks { uint marks[]; };
 layout(set = 1, binding = RTR_ARR_OUT, std430) RTR_COHERENT buffer Out { uint out_index[]; };

@@ -1,7 +1,8 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 // Encoded index of each surviving inner node, in Morton order (the root gets 0), and the
-// slots of the leaves that hang on it.
+// slots of the leaves that hang on it. The sums of the blocks before come from number_count and
+// number_scan, unless there is only one block.
 #include "common.glsl"
 #include "survive.glsl"
 
@@ -49,8 +50,13 @@ void main() {
         barrier();
     }
     if (group_index() >= p.blocks) return;
-    uint at = state[RTR_ST_SUMS + group_index()] + sums[lane] - own;
-    uint slot = state[RTR_ST_SUMS + p.blocks + group_index()] + slot_sums[lane] - own_s;
+    uint at = sums[lane] - own, slot = slot_sums[lane] - own_s;
+    if (p.blocks > 1u) {
+        at += state[RTR_ST_SUMS + group_index()];
+        slot += state[RTR_ST_SUMS + p.blocks + group_index()];
+    } else if (lane == RTR_GROUP - 1u) {
+        state[RTR_ST_NODES] = sums[lane];
+    }
     for (uint k = 0u; k < RTR_SCAN_ITEMS; k++) {
         uint node = first + k;
         if (alive[k]) {
