@@ -1,7 +1,7 @@
 // Tier `exact`: which triangle is hit, and in which order, is what exact
 // arithmetic says about these floats: the vertices in the slots and the ray of
 // the level, which is the launch's ray (its direction times a power of two,
-// rtc_choose_scale) after one rounding of each operation in
+// rtc_t_down) after one rounding of each operation in
 // rtc_transform_point and rtc_transform_vector.
 //
 // A ray that meets an edge or a vertex exactly is moved by (e, e^2) along
@@ -239,7 +239,9 @@ bool rtc_exact_triangle(vec3 v0, vec3 v1, vec3 v2, ivec3 known, out float t, out
     return hit;
 }
 
-bool rtc_triangle(vec3 v0, vec3 v1, vec3 v2, out float t, out float b1, out float b2, out bool front) {
+bool rtc_triangle(vec3 v0, vec3 v1, vec3 v2, out float t, out float b1, out float b2, out bool front,
+                  out bool undecided) {
+    undecided = false;
     vec3 a = rtc_axes(v0 - rtc_trav_origin);
     vec3 b = rtc_axes(v1 - rtc_trav_origin);
     vec3 c = rtc_axes(v2 - rtc_trav_origin);
@@ -303,9 +305,9 @@ uvec3 rtc_slot_vertex(RtcBase slots, uint slot, uint i) {
 int rtc_wide_order(uint candidate, uint slot, float other) {
     uvec3 o = rtc_bits(rtc_trav_origin);
     uvec3 d = rtc_bits(rtc_trav_direction);
-    uvec3 v0 = rtc_slot_vertex(rtc_trav_slots, candidate, 0u);
-    uvec3 v1 = rtc_slot_vertex(rtc_trav_slots, candidate, 1u);
-    uvec3 v2 = rtc_slot_vertex(rtc_trav_slots, candidate, 2u);
+    uvec3 v0 = rtc_slot_vertex(rtc_advance(rtc_trav_base, rtc_trav_slots), candidate, 0u);
+    uvec3 v1 = rtc_slot_vertex(rtc_advance(rtc_trav_base, rtc_trav_slots), candidate, 1u);
+    uvec3 v2 = rtc_slot_vertex(rtc_advance(rtc_trav_base, rtc_trav_slots), candidate, 2u);
     bool same = false;
     uvec3 w0 = uvec3(0u), w1 = uvec3(0u), w2 = uvec3(0u), o2 = uvec3(0u), d2 = uvec3(0u);
     if (slot != RTC_NONE) {
@@ -318,7 +320,7 @@ int rtc_wide_order(uint candidate, uint slot, float other) {
         w2 = rtc_slot_vertex(slots, slot, 2u);
         o2 = rtc_bits(rtc_object_ray_origin(rtc_ray_root, rtc_hit_instance, rtc_ray_origin));
         d2 = rtc_bits(rtc_object_ray_direction(rtc_ray_root, rtc_hit_instance,
-                                               rtc_ray_direction * rtc_trav_t_down));
+                                               rtc_ray_direction * rtc_t_down()));
         // Duplicates need no arithmetic: there may be thousands.
         same = v0 == w0 && v1 == w1 && v2 == w2 && o == o2 && d == d2;
     }
@@ -337,7 +339,7 @@ int rtc_wide_order(uint candidate, uint slot, float other) {
             uvec3 y2 = mix(p0, origin, bvec3(above)), z2 = y2;
             if (second && slot == RTC_NONE) {
                 x1 = uvec3(above ? floatBitsToUint(other) : one, 0u, 0u);
-                p1 = uvec3(0u, above ? floatBitsToUint(rtc_trav_t_up) : one, 0u);
+                p1 = uvec3(0u, above ? floatBitsToUint(rtc_t_up()) : one, 0u);
                 p2 = uvec3(0u, 0u, one);
                 x2 = none;
                 y2 = none;
@@ -352,8 +354,9 @@ int rtc_wide_order(uint candidate, uint slot, float other) {
 }
 
 bool rtc_comes_first(uint instance, uint geometry, uint primitive) {
+    uint committed = rtc_hit_packed & RTC_SLOT_GEOMETRY_MASK;
     return instance != rtc_hit_instance   ? instance < rtc_hit_instance
-           : geometry != rtc_hit_geometry ? geometry < rtc_hit_geometry
+           : geometry != committed ? geometry < committed
                                           : primitive < rtc_hit_primitive;
 }
 
@@ -368,7 +371,7 @@ bool rtc_in_range(float t, uint slot, uint primitive, uint geometry) {
         for (uint i = 0u; i < 2u && inside; ++i) {
             bool low = i == 0u;
             if (low ? near_min : near_max) {
-                int order = rtc_wide_order(slot, low ? RTC_NONE : against, low ? max(rtc_ray_tmin, 0.0) : rtc_hit_t);
+                int order = rtc_wide_order(slot, low ? RTC_NONE : against, low ? max(rtc_ray_tmin, 0.0) : rtc_ray_tmax);
                 bool wins = order == 0 && rtc_hit_instance != RTC_NONE &&
                             rtc_comes_first(rtc_trav_instance, geometry & RTC_SLOT_GEOMETRY_MASK, primitive);
                 inside = low ? order > 0 : order < 0 || wins;

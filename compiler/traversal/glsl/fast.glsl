@@ -14,7 +14,9 @@ void rtc_level_numbers(RtcBase base, vec3 o, vec3 d, bool top) {
     rtc_trav_high = o;
 }
 
-bool rtc_triangle(vec3 v0, vec3 v1, vec3 v2, out float t, out float b1, out float b2, out bool front) {
+bool rtc_triangle(vec3 v0, vec3 v1, vec3 v2, out float t, out float b1, out float b2, out bool front,
+                  out bool undecided) {
+    undecided = false;
     vec3 o = rtc_trav_origin;
     vec3 d = rtc_trav_direction;
     float ax = v1.x - v0.x, ay = v1.y - v0.y, az = v1.z - v0.z;

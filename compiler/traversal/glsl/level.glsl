@@ -2,23 +2,6 @@
 // derives from it once instead of at every step. One copy serves the top
 // level, instances, and rays that resume.
 
-// Powers of two whose product with the largest |d| lies in [1, 2): rays with
-// extreme directions would overflow the reciprocals below. Ordinary rays keep
-// their bits and their t.
-const float RTC_DIRECTION_MIN = 9.31322574615e-10; // 2^-30
-const float RTC_DIRECTION_MAX = 1073741824.0; // 2^30
-
-void rtc_choose_scale() {
-    float largest = rtc_largest(rtc_ray_direction);
-    rtc_trav_t_down = 1.0;
-    rtc_trav_t_up = 1.0;
-    if (largest < RTC_DIRECTION_MIN || largest > RTC_DIRECTION_MAX) {
-        int exponent = clamp(int(floatBitsToUint(largest) >> 23u) - 127, -126, 126);
-        rtc_trav_t_down = uintBitsToFloat(uint(127 - exponent) << 23u);
-        rtc_trav_t_up = uintBitsToFloat(uint(127 + exponent) << 23u);
-    }
-}
-
 bool rtc_holds_aabbs(uint facts) {
     return RTC_LINK_MIXED ? (facts & RTC_FACT_AABBS) != 0u : !RTC_LINK_TRIANGLES;
 }
@@ -49,21 +32,19 @@ uint rtc_level_bits(uint facts, uint instance_flags) {
 }
 
 void rtc_level_setup() {
-    rtc_trav_setup = 0u;
+    bool root = rtc_trav_cur == RTC_REF_ENTER;
     bool top = RTC_LINK_LEVELS && rtc_trav_instance == RTC_NONE;
     bool enter = true;
     RtcBase base = rtc_ray_root;
     uint bits = 0u;
-    uint record_index = 0u;
     vec3 o = rtc_ray_origin;
-    vec3 d = rtc_ray_direction * rtc_trav_t_down;
+    vec3 d = rtc_ray_direction * rtc_t_down();
     if (!top) {
-        RtcBase record = rtc_advance(rtc_trav_records, rtc_trav_instance * RTC_INSTANCE_QUADS);
+        RtcBase record = rtc_instance_record(rtc_ray_root, rtc_trav_instance);
         uvec4 ids = rtc_quad(record, 6u);
         uint facts = rtc_quad(record, 7u).x;
         base = rtc_base(ids.x, ids.y);
         bits = rtc_level_bits(facts, ids.w >> 24u);
-        record_index = (ids.w & 0x00ffffffu) + (rtc_ray_sbt_offset & 15u);
         bool aabbs = (bits & RTC_LEVEL_AABBS) != 0u;
         uint skip = aabbs ? RTC_RAY_SKIP_AABBS : RTC_RAY_SKIP_TRIANGLES;
         uint mask = RTC_LINK_MASKS ? ids.z >> 24u : 0xffu;
@@ -82,20 +63,18 @@ void rtc_level_setup() {
     }
     if (enter) {
         uvec4 header = rtc_quad(base, RTC_HDR_NODES / 4u); // nodes, slots, node count, slot count
-        rtc_trav_nodes = rtc_advance(base, header.x);
-        rtc_trav_slots = rtc_advance(base, header.y);
-        rtc_trav_record = record_index;
-        rtc_trav_bits = bits;
+        rtc_trav_base = base;
+        rtc_trav_slots = header.y;
+        uint all_bits = (1u << RTC_WORD_AXIS_SHIFT) - (1u << RTC_WORD_BITS_SHIFT);
+        rtc_trav_word = (rtc_trav_word & ~all_bits) | bits;
         rtc_trav_origin = o;
         rtc_trav_direction = d;
         rtc_level_numbers(base, o, d, top);
-        if (header.z == 0u) {
-            rtc_trav_cur = RTC_REF_EMPTY;
-        }
+        rtc_trav_cur = root ? (header.z == 0u ? RTC_REF_EMPTY : 0u) : RTC_REF_POP;
     } else {
         // Nothing of the top level's data was touched: carry on there.
         rtc_trav_instance = RTC_NONE;
-        rtc_trav_floor = 0u;
+        rtc_set_floor(0u);
         rtc_trav_cur = RTC_REF_POP;
     }
 }

@@ -1,5 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 // A texel buffer without a sampler: SPIR-V 1.6 knows no sampled image of a buffer.
 #extension GL_EXT_samplerless_texture_functions : require
 #ifdef RTC_ADDRESS_MODE

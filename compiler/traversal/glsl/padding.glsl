@@ -5,13 +5,12 @@
 // factor (1 + u), or (1 + 2u) where the device rounds towards zero; Vulkan's
 // division may cost 2.5 ulp = 5u.
 
-uint rtc_trav_axis; // kz: the axis along which the ray moves fastest
 vec3 rtc_trav_shear; // d.kx / d.kz, d.ky / d.kz, d.kz
 
-// kx, ky, kz: cyclic, so that orientation is kept. (mix with booleans is a
+// kz is the axis along which the ray moves fastest. kx, ky, kz: cyclic, so that orientation is kept. (mix with booleans is a
 // select, not arithmetic; `?:` of vectors would become a branch.)
 vec3 rtc_axes(vec3 v) {
-    return mix(mix(v, v.zxy, bvec3(rtc_trav_axis == 1u)), v.yzx, bvec3(rtc_trav_axis == 0u));
+    return mix(mix(v, v.zxy, bvec3(rtc_axis() == 1u)), v.yzx, bvec3(rtc_axis() == 0u));
 }
 
 // Slabs compute t = fl(fl(b - o) * inverse) with |error| <= (1 or 2 + 5 + 1 or
@@ -58,7 +57,7 @@ void rtc_level_numbers(RtcBase base, vec3 o, vec3 d, bool top) {
     vec3 bounds_min = uintBitsToFloat(rtc_quad(base, RTC_HDR_BOUNDS_MIN / 4u).xyz);
     vec3 bounds_max = uintBitsToFloat(rtc_quad(base, RTC_HDR_BOUNDS_MAX / 4u).xyz);
     vec3 a = abs(d);
-    rtc_trav_axis = a.x > a.y ? (a.x > a.z ? 0u : 2u) : (a.y > a.z ? 1u : 2u);
+    rtc_set_axis(a.x > a.y ? (a.x > a.z ? 0u : 2u) : (a.y > a.z ? 1u : 2u));
     vec3 k = rtc_axes(d);
     rtc_trav_shear = vec3(k.x / k.z, k.y / k.z, k.z);
 

@@ -28,14 +28,10 @@ layout(set = 0, binding = RTC_BINDING_SCRATCH, std430) buffer RtcScratch { uint 
 // (RTC_ADDRESS_MODE): a device address; nothing is bound.
 #ifdef RTC_ADDRESS_MODE
 #define RtcBase uvec2
-struct RtcQuads3 {
-    uvec4 q0, q1, q2;
-};
 struct RtcQuads4 {
     uvec4 q0, q1, q2, q3;
 };
 layout(buffer_reference, buffer_reference_align = 16, std430) readonly buffer RtcQuadsAt { uvec4 q[]; };
-layout(buffer_reference, buffer_reference_align = 16, std430) readonly buffer RtcTrianglesAt { RtcQuads3 q[]; };
 layout(buffer_reference, buffer_reference_align = 16, std430) readonly buffer RtcNodesAt { RtcQuads4 q[]; };
 
 uvec4 rtc_quad(RtcBase base, uint index) { return RtcQuadsAt(base).q[index]; }

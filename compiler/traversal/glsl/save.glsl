@@ -5,8 +5,7 @@ const uint RTC_TRACE_STATE_HEADER = 32u;
 void rtc_trace_save(uint first_word) {
     uint w = first_word;
     rtc_scratch_store(w, rtc_trav_cur);
-    rtc_scratch_store(w + 1u, rtc_trav_sp);
-    rtc_scratch_store(w + 2u, rtc_trav_floor);
+    rtc_scratch_store(w + 1u, rtc_trav_word);
     rtc_scratch_store(w + 3u, rtc_trav_instance);
 #ifdef RTC_ADDRESS_MODE
     rtc_scratch_store(w + 4u, rtc_ray_root.x);
@@ -26,12 +25,12 @@ void rtc_trace_save(uint first_word) {
     rtc_scratch_store(w + 13u, floatBitsToUint(rtc_ray_direction.y));
     rtc_scratch_store(w + 14u, floatBitsToUint(rtc_ray_direction.z));
     rtc_scratch_store(w + 15u, floatBitsToUint(rtc_ray_tmax));
-    rtc_scratch_store(w + 16u, floatBitsToUint(rtc_hit_t));
-    rtc_scratch_store(w + 17u, rtc_hit_kind);
+    rtc_scratch_store(w + 16u, floatBitsToUint(rtc_trav_tmax));
+    rtc_scratch_store(w + 20u, floatBitsToUint(rtc_hit_t));
+    rtc_scratch_store(w + 21u, floatBitsToUint(rtc_trav_tmin));
+    rtc_scratch_store(w + 17u, rtc_hit_packed);
     rtc_scratch_store(w + 18u, rtc_hit_instance);
     rtc_scratch_store(w + 19u, rtc_hit_primitive);
-    rtc_scratch_store(w + 20u, rtc_hit_geometry);
-    rtc_scratch_store(w + 21u, rtc_hit_record);
     rtc_scratch_store(w + 22u, rtc_hit_attr0);
     rtc_scratch_store(w + 23u, rtc_hit_attr1);
     if (RTC_LINK_AABBS) {
@@ -46,7 +45,7 @@ void rtc_trace_save(uint first_word) {
     rtc_scratch_store(w + 31u, rtc_hit_slot);
 #endif
     w += RTC_TRACE_STATE_HEADER;
-    for (uint i = 0u; i < rtc_trav_sp; ++i) {
+    for (uint i = 0u; i < rtc_sp(); ++i) {
         rtc_scratch_store(w + i, rtc_stack_get(i));
         rtc_turns++;
     }
@@ -55,8 +54,7 @@ void rtc_trace_save(uint first_word) {
 void rtc_trace_restore(uint first_word) {
     uint w = first_word;
     rtc_trav_cur = rtc_scratch_load(w);
-    rtc_trav_sp = rtc_scratch_load(w + 1u);
-    rtc_trav_floor = rtc_scratch_load(w + 2u);
+    rtc_trav_word = rtc_scratch_load(w + 1u);
     rtc_trav_instance = rtc_scratch_load(w + 3u);
 #ifdef RTC_ADDRESS_MODE
     rtc_ray_root = uvec2(rtc_scratch_load(w + 4u), rtc_scratch_load(w + 30u));
@@ -77,12 +75,13 @@ void rtc_trace_restore(uint first_word) {
     rtc_ray_direction.y = uintBitsToFloat(rtc_scratch_load(w + 13u));
     rtc_ray_direction.z = uintBitsToFloat(rtc_scratch_load(w + 14u));
     rtc_ray_tmax = uintBitsToFloat(rtc_scratch_load(w + 15u));
-    rtc_hit_t = uintBitsToFloat(rtc_scratch_load(w + 16u));
-    rtc_hit_kind = rtc_scratch_load(w + 17u);
+    rtc_trav_tmax = uintBitsToFloat(rtc_scratch_load(w + 16u));
+    rtc_hit_t = uintBitsToFloat(rtc_scratch_load(w + 20u));
+    rtc_trav_tmin = uintBitsToFloat(rtc_scratch_load(w + 21u));
+    rtc_hit_packed = rtc_scratch_load(w + 17u);
     rtc_hit_instance = rtc_scratch_load(w + 18u);
+    rtc_hit_unpack(); // a lane may have stopped between the walk's end and the hit shader
     rtc_hit_primitive = rtc_scratch_load(w + 19u);
-    rtc_hit_geometry = rtc_scratch_load(w + 20u);
-    rtc_hit_record = rtc_scratch_load(w + 21u);
     rtc_hit_attr0 = rtc_scratch_load(w + 22u);
     rtc_hit_attr1 = rtc_scratch_load(w + 23u);
     if (RTC_LINK_AABBS) {
@@ -97,10 +96,16 @@ void rtc_trace_restore(uint first_word) {
     rtc_hit_slot = rtc_scratch_load(w + 31u);
 #endif
     w += RTC_TRACE_STATE_HEADER;
-    for (uint i = 0u; i < min(rtc_trav_sp, RTC_TRAVERSAL_STACK); ++i) {
+    for (uint i = 0u; i < min(rtc_sp(), RTC_TRAVERSAL_STACK); ++i) {
         rtc_stack_set(i, rtc_scratch_load(w + i));
         rtc_turns++;
     }
-    // A finished ray has nothing to set up.
-    rtc_trav_setup = rtc_trav_cur == RTC_REF_DONE ? 0u : 1u;
+    // The data of the level are made again, and then the walk goes on where it was. (A finished ray has none.)
+    if (rtc_trav_cur != RTC_REF_DONE) {
+        if (rtc_trav_cur != RTC_REF_POP) {
+            rtc_stack_set(rtc_sp(), rtc_trav_cur);
+            rtc_trav_word++;
+        }
+        rtc_trav_cur = RTC_REF_SETUP;
+    }
 }

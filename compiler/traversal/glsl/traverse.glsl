@@ -8,13 +8,14 @@ const uint RTC_STEP_AABB = 2u; // candidate AABB: run the intersection shader
 const uint RTC_STEP_SUSPEND = 3u; // budget exhausted
 const uint RTC_STEP_OVERFLOW = 4u; // inside the loop only
 const uint RTC_STEP_RUNNING = 5u;
+const uint RTC_STEP_UNDECIDED = 6u; // inside rtc_trace_step only: floats do not decide the triangle under the cursor
 
 bool rtc_inner(uint reference) { return (reference & RTC_REF_LEAF) == 0u; }
 uint rtc_count(uint reference) { return (reference >> RTC_REF_COUNT_SHIFT) & RTC_REF_COUNT_MASK; }
 
 // A lane suspends only while its stack fits what rtc_trace_save keeps.
 bool rtc_budget_spent() {
-    return RTC_LINK_RESUMABLE && RTC_STEP_BUDGET != 0xffffffffu && rtc_turns >= RTC_STEP_BUDGET && rtc_trav_sp <= RTC_TRAVERSAL_STACK;
+    return RTC_LINK_RESUMABLE && RTC_STEP_BUDGET != 0xffffffffu && rtc_turns >= RTC_STEP_BUDGET && rtc_sp() <= RTC_TRAVERSAL_STACK;
 }
 
 // Is the scene what the module was told that scenes are? If not, the lane ends here (rtc_refused): whatever
@@ -40,11 +41,11 @@ bool rtc_scene_accepted() {
 void rtc_trace_begin() {
     rtc_refused = 0u;
     rtc_hit_t = rtc_ray_tmax;
-    rtc_hit_kind = 0u;
+    rtc_trav_tmin = 0.0;
+    rtc_trav_tmax = 0.0;
+    rtc_hit_packed = 0u;
     rtc_hit_instance = RTC_NONE;
     rtc_hit_primitive = 0u;
-    rtc_hit_geometry = 0u;
-    rtc_hit_record = 0u;
     rtc_hit_attr0 = 0u;
     rtc_hit_attr1 = 0u;
     rtc_hit_attr2 = 0u;
@@ -54,10 +55,8 @@ void rtc_trace_begin() {
     rtc_hit_attr6 = 0u;
     rtc_hit_attr7 = 0u;
     rtc_trav_cur = RTC_REF_DONE;
-    rtc_trav_sp = 0u;
-    rtc_trav_floor = 0u;
+    rtc_trav_word = 0u;
     rtc_trav_instance = RTC_NONE;
-    rtc_trav_setup = 0u;
     // Undefined in Vulkan: NaN anywhere, infinite origin or direction, and the
     // null direction. All miss. A negative tmin acts as 0.
     vec3 o = rtc_ray_origin;
@@ -78,30 +77,22 @@ void rtc_trace_begin() {
                 rtc_trav_instance = single - 1u;
             }
             if (RTC_LINK_LEVELS || single != 0u) {
-                rtc_trav_setup = 1u;
-                rtc_trav_cur = 0u;
+                rtc_trav_word = rtc_scale_exponent() << RTC_WORD_SCALE_SHIFT;
+                rtc_trav_cur = RTC_REF_ENTER;
+                rtc_trav_tmin = max(rtc_ray_tmin, 0.0) * rtc_t_up();
+                rtc_trav_tmax = rtc_ray_tmax * rtc_t_up();
             }
         }
     }
 }
 
-// What follows from ray and root rather than from the walk.
-void rtc_ray_setup() {
-    rtc_choose_scale();
-    rtc_trav_tmin = max(rtc_ray_tmin, 0.0) * rtc_trav_t_up;
-    rtc_trav_tmax = rtc_hit_t * rtc_trav_t_up;
-    rtc_trav_records = rtc_advance(rtc_ray_root, rtc_quad(rtc_ray_root, RTC_HDR_SLOTS / 4u)[RTC_HDR_SLOTS & 3u]);
-}
-
 void rtc_trace_stop() { rtc_trav_cur = RTC_REF_DONE; }
 
-void rtc_trace_accept() {
-    rtc_hit_t = rtc_cand_t;
-    rtc_hit_kind = rtc_cand_kind;
+// What becomes of a candidate whose t is rtc_trav_tmax by now.
+void rtc_commit() {
+    rtc_hit_packed = rtc_cand_geometry | (rtc_cand_kind << 24u);
     rtc_hit_instance = rtc_cand_instance;
     rtc_hit_primitive = rtc_cand_primitive;
-    rtc_hit_geometry = rtc_cand_geometry;
-    rtc_hit_record = rtc_cand_record;
     rtc_hit_attr0 = rtc_cand_attr0;
     rtc_hit_attr1 = rtc_cand_attr1;
     if (RTC_LINK_AABBS) { // only intersection shaders fill the rest
@@ -113,17 +104,46 @@ void rtc_trace_accept() {
         rtc_hit_attr7 = rtc_cand_attr7;
     }
     rtc_accepted();
-    rtc_trav_tmax = rtc_cand_t * rtc_trav_t_up;
     if ((rtc_ray_flags & RTC_RAY_TERMINATE_ON_FIRST_HIT) != 0u) {
         rtc_trav_cur = RTC_REF_DONE;
+    }
+}
+
+void rtc_trace_accept() {
+    rtc_hit_t = rtc_cand_t;
+    rtc_trav_tmax = rtc_cand_t * rtc_t_up();
+    rtc_commit();
+}
+
+// Index of the hit record: Vulkan, "Hit Shader Binding Table Record Addressing".
+uint rtc_record_index(uint instance, uint geometry) {
+    uint offset = rtc_quad(rtc_instance_record(rtc_ray_root, instance), 6u).w & 0x00ffffffu;
+    return offset + (rtc_ray_sbt_offset & 15u) + geometry * (rtc_ray_sbt_stride & 15u);
+}
+
+void rtc_hit_unpack() {
+    // Reports are compared with rtc_hit_t meanwhile, so that with AABBs it is kept.
+    if (!RTC_LINK_AABBS) {
+        rtc_hit_t = rtc_trav_tmax * rtc_t_down();
+    }
+    rtc_hit_kind = rtc_hit_packed >> 24u;
+    rtc_hit_geometry = rtc_hit_packed & RTC_SLOT_GEOMETRY_MASK;
+}
+
+// What hit shaders are told, once for the ray.
+void rtc_hit_finish() {
+    rtc_hit_unpack();
+    rtc_hit_record = 0u;
+    if (rtc_hit_instance != RTC_NONE) {
+        rtc_hit_record = rtc_record_index(rtc_hit_instance, rtc_hit_geometry);
     }
 }
 
 // Effective opacity of a slot, 2 when the ray flags drop it.
 uint rtc_opacity(uint slot_flags) {
     uint opaque = !RTC_LINK_NON_OPAQUE || (slot_flags & RTC_SLOT_OPAQUE) != 0u ? 1u : 0u;
-    if ((rtc_trav_bits & RTC_LEVEL_FORCE) != 0u) {
-        opaque = (rtc_trav_bits & RTC_LEVEL_OPAQUE) != 0u ? 1u : 0u;
+    if ((rtc_trav_word & RTC_LEVEL_FORCE) != 0u) {
+        opaque = (rtc_trav_word & RTC_LEVEL_OPAQUE) != 0u ? 1u : 0u;
     }
     uint drop = opaque != 0u ? RTC_RAY_CULL_OPAQUE : RTC_RAY_CULL_NO_OPAQUE;
     return (rtc_ray_flags & drop) != 0u ? 2u : opaque;
@@ -152,34 +172,18 @@ void rtc_candidate(uint primitive, uint geometry_flags, uint opacity) {
     rtc_cand_instance = rtc_trav_instance;
     rtc_cand_primitive = primitive;
     rtc_cand_geometry = geometry_flags & RTC_SLOT_GEOMETRY_MASK;
-    rtc_cand_record = rtc_trav_record + rtc_cand_geometry * (rtc_ray_sbt_stride & 15u);
     rtc_cand_opaque = opacity;
 }
 
-uint rtc_test_triangle(uint slot) {
-#ifdef RTC_ADDRESS_MODE
-    uvec4 q0 = RtcTrianglesAt(rtc_trav_slots).q[slot].q0;
-    uvec4 q1 = RtcTrianglesAt(rtc_trav_slots).q[slot].q1;
-    uvec4 q2 = RtcTrianglesAt(rtc_trav_slots).q[slot].q2;
-#else
-    uint at = rtc_trav_slots + slot * RTC_TRIANGLE_QUADS;
-    uvec4 q0 = rtc_quad(at, 0u);
-    uvec4 q1 = rtc_quad(at, 1u);
-    uvec4 q2 = rtc_quad(at, 2u);
-#endif
-    float t, b1, b2;
-    bool front;
+// A triangle that the ray meets at t, in units of the scaled direction: whether it counts, and what follows.
+uint rtc_meet_triangle(uint slot, uint primitive, uint flags, float t, float b1, float b2, bool front) {
     uint result = RTC_STEP_RUNNING;
-    vec3 v0 = uintBitsToFloat(q0.xyz);
-    vec3 v1 = uintBitsToFloat(q1.xyz);
-    vec3 v2 = uintBitsToFloat(q2.xyz);
-    if (rtc_triangle(v0, v1, v2, t, b1, b2, front) && rtc_in_range(t, slot, q0.w, q1.w)) {
-        front = front != ((rtc_trav_bits & RTC_LEVEL_FLIP) != 0u);
-        uint opacity = rtc_opacity(q1.w);
+    if (rtc_in_range(t, slot, primitive, flags)) {
+        front = front != ((rtc_trav_word & RTC_LEVEL_FLIP) != 0u);
+        uint opacity = rtc_opacity(flags);
         uint cull = front ? RTC_LEVEL_CULL_FRONT : RTC_LEVEL_CULL_BACK;
-        if ((rtc_trav_bits & cull) == 0u && opacity != 2u) {
-            rtc_candidate(q0.w, q1.w, opacity);
-            rtc_cand_t = t * rtc_trav_t_down;
+        if ((rtc_trav_word & cull) == 0u && opacity != 2u) {
+            rtc_candidate(primitive, flags, opacity);
             rtc_cand_kind = front ? RTC_HIT_KIND_FRONT : RTC_HIT_KIND_BACK;
             rtc_cand_attr0 = floatBitsToUint(b1);
             rtc_cand_attr1 = floatBitsToUint(b2);
@@ -192,23 +196,72 @@ uint rtc_test_triangle(uint slot) {
                 rtc_cand_attr7 = 0u;
             }
             if (RTC_LINK_ANY_HIT && opacity == 0u) {
+                rtc_cand_t = t * rtc_t_down();
+                rtc_cand_record = rtc_record_index(rtc_cand_instance, rtc_cand_geometry);
                 result = RTC_STEP_TRIANGLE;
             } else {
-                rtc_trace_accept();
+                rtc_trav_tmax = t;
+                if (RTC_LINK_AABBS) {
+                    rtc_hit_t = t * rtc_t_down();
+                }
+                rtc_commit();
             }
         }
     }
     return result;
 }
 
+uint rtc_test_triangle(uint slot) {
+    RtcBase at = rtc_advance(rtc_trav_base, rtc_trav_slots + slot * RTC_TRIANGLE_QUADS);
+    uvec4 q0 = rtc_quad(at, 0u);
+    uvec4 q1 = rtc_quad(at, 1u);
+    uvec4 q2 = rtc_quad(at, 2u);
+    float t, b1, b2;
+    bool front, undecided;
+    uint result = RTC_STEP_RUNNING;
+    if (rtc_triangle(uintBitsToFloat(q0.xyz), uintBitsToFloat(q1.xyz), uintBitsToFloat(q2.xyz), t, b1, b2, front,
+                     undecided)) {
+        result = rtc_meet_triangle(slot, q0.w, q1.w, t, b1, b2, front);
+    } else if (undecided) {
+        result = RTC_STEP_UNDECIDED;
+    }
+    return result;
+}
+
+#ifdef RTC_TIER_DEFERS
+// The same for a triangle that was undecided.
+uint rtc_settle_triangle(uint slot) {
+    RtcBase at = rtc_advance(rtc_trav_base, rtc_trav_slots + slot * RTC_TRIANGLE_QUADS);
+    uint turns;
+    float side = rtc_exact_side(rtc_sheared(uintBitsToFloat(rtc_quad(at, 0u).xyz)).xy,
+                                rtc_sheared(uintBitsToFloat(rtc_quad(at, 1u).xyz)).xy,
+                                rtc_sheared(uintBitsToFloat(rtc_quad(at, 2u).xyz)).xy, turns);
+    uint result = RTC_STEP_RUNNING;
+    if (side != 0.0) {
+        // Read again (after three turns, which compilers do not know) rather than kept meanwhile.
+        at = rtc_advance(at, turns - 3u);
+        uvec4 q0 = rtc_quad(at, 0u);
+        uvec4 q1 = rtc_quad(at, 1u);
+        uvec4 q2 = rtc_quad(at, 2u);
+        float t, b1, b2;
+        bool front;
+        rtc_triangle_at(uintBitsToFloat(q0.xyz), uintBitsToFloat(q1.xyz), uintBitsToFloat(q2.xyz), side, t, b1, b2,
+                        front);
+        result = rtc_meet_triangle(slot, q0.w, q1.w, t, b1, b2, front);
+    }
+    return result;
+}
+#endif
+
 uint rtc_test_aabb(uint slot) {
-    uvec4 q0 = rtc_quad(rtc_trav_slots, slot * RTC_AABB_QUADS);
-    uvec4 q1 = rtc_quad(rtc_trav_slots, slot * RTC_AABB_QUADS + 1u);
+    uvec4 q0 = rtc_quad(rtc_trav_base, rtc_trav_slots + slot * RTC_AABB_QUADS);
+    uvec4 q1 = rtc_quad(rtc_trav_base, rtc_trav_slots + slot * RTC_AABB_QUADS + 1u);
     uint opacity = rtc_opacity(q1.w);
     float near;
     uint result = RTC_STEP_RUNNING;
     if (rtc_slab(uintBitsToFloat(q0.xyz), uintBitsToFloat(q1.xyz), near) && opacity != 2u) {
         rtc_candidate(q0.w, q1.w, opacity);
+        rtc_cand_record = rtc_record_index(rtc_cand_instance, rtc_cand_geometry);
         result = RTC_STEP_AABB;
     }
     return result;
@@ -218,12 +271,12 @@ uint rtc_test_aabb(uint slot) {
 // (mix with a boolean is a select.)
 uint rtc_test_node() {
 #ifdef RTC_ADDRESS_MODE
-    uvec4 q0 = RtcNodesAt(rtc_trav_nodes).q[rtc_trav_cur].q0;
-    uvec4 q1 = RtcNodesAt(rtc_trav_nodes).q[rtc_trav_cur].q1;
-    uvec4 q2 = RtcNodesAt(rtc_trav_nodes).q[rtc_trav_cur].q2;
-    uvec4 q3 = RtcNodesAt(rtc_trav_nodes).q[rtc_trav_cur].q3;
+    uvec4 q0 = RtcNodesAt(rtc_trav_base).q[rtc_trav_cur + RTC_AS_HEADER_QUADS / RTC_NODE_QUADS].q0;
+    uvec4 q1 = RtcNodesAt(rtc_trav_base).q[rtc_trav_cur + RTC_AS_HEADER_QUADS / RTC_NODE_QUADS].q1;
+    uvec4 q2 = RtcNodesAt(rtc_trav_base).q[rtc_trav_cur + RTC_AS_HEADER_QUADS / RTC_NODE_QUADS].q2;
+    uvec4 q3 = RtcNodesAt(rtc_trav_base).q[rtc_trav_cur + RTC_AS_HEADER_QUADS / RTC_NODE_QUADS].q3;
 #else
-    uint at = rtc_trav_nodes + rtc_trav_cur * RTC_NODE_QUADS;
+    uint at = rtc_trav_base + (RTC_AS_HEADER_QUADS + rtc_trav_cur * RTC_NODE_QUADS);
     uvec4 q0 = rtc_quad(at, 0u);
     uvec4 q1 = rtc_quad(at, 1u);
     uvec4 q2 = rtc_quad(at, 2u);
@@ -238,9 +291,9 @@ uint rtc_test_node() {
     rtc_trav_cur = mix(mix(RTC_REF_POP, q0.w, hit0), q1.w, second);
     uint result = RTC_STEP_RUNNING;
     if (hit0 && hit1) {
-        if (rtc_trav_sp < RTC_STACK_ENTRIES) {
-            rtc_stack_set(rtc_trav_sp, mix(q1.w, q0.w, second));
-            rtc_trav_sp++;
+        if (rtc_sp() < RTC_STACK_ENTRIES) {
+            rtc_stack_set(rtc_sp(), mix(q1.w, q0.w, second));
+            rtc_trav_word++;
         } else {
             result = RTC_STEP_OVERFLOW;
         }
@@ -248,76 +301,94 @@ uint rtc_test_node() {
     return result;
 }
 
+// Takes the slot under the cursor, a leaf's.
+uint rtc_next_slot() {
+    uint slot = rtc_trav_cur & RTC_REF_INDEX_MASK;
+    rtc_trav_cur += 1u - (1u << RTC_REF_COUNT_SHIFT);
+    rtc_trav_cur = rtc_count(rtc_trav_cur) == 0u ? RTC_REF_POP : rtc_trav_cur;
+    return slot;
+}
+
 uint rtc_trace_step() {
     uint result = RTC_STEP_RUNNING;
     do {
-        // Not between choosing an instance and entering it: one that is not entered goes on in the
-        // top level, whose data a resumed lane would not have.
-        if (rtc_budget_spent() && rtc_trav_cur != RTC_REF_DONE && rtc_trav_setup != 2u) {
-            result = RTC_STEP_SUSPEND;
-        } else {
-            rtc_turns++;
-            if (rtc_trav_setup != 0u) {
-                if (rtc_trav_setup == 1u) {
-                    rtc_ray_setup();
+        result = RTC_STEP_RUNNING;
+        do {
+            // Not between choosing an instance and entering it: one that is not entered goes on in the
+            // top level, whose data a resumed lane would not have.
+            if (rtc_budget_spent() && (rtc_trav_cur < RTC_REF_SETUP || rtc_trav_cur == RTC_REF_POP)) {
+                result = RTC_STEP_SUSPEND;
+            } else {
+                rtc_turns++;
+                if ((rtc_trav_cur | 1u) == RTC_REF_ENTER) {
+                    rtc_level_setup();
                 }
-                rtc_level_setup();
-            }
-            do {
-                if (rtc_trav_cur == RTC_REF_POP) {
-                    if (rtc_trav_sp == rtc_trav_floor) {
-                        rtc_trav_cur = RTC_REF_EMPTY; // this level is finished
+                do {
+                    if (rtc_trav_cur == RTC_REF_POP) {
+                        if (rtc_sp() == rtc_floor()) {
+                            rtc_trav_cur = RTC_REF_EMPTY; // this level is finished
+                        } else {
+                            rtc_trav_word--;
+                            rtc_trav_cur = rtc_stack_get(rtc_sp());
+                        }
+                    }
+                    if (rtc_inner(rtc_trav_cur)) {
+                        result = rtc_test_node();
+                    }
+                    rtc_turns++;
+                } while (RTC_WHILE_WHILE != 0u && result == RTC_STEP_RUNNING && !rtc_budget_spent() &&
+                         (rtc_inner(rtc_trav_cur) || rtc_trav_cur == RTC_REF_POP));
+
+                if (!rtc_inner(rtc_trav_cur) && rtc_trav_cur != RTC_REF_POP && result == RTC_STEP_RUNNING) {
+                    if (rtc_trav_cur == RTC_REF_DONE) {
+                        result = RTC_STEP_DONE;
+                    } else if (rtc_count(rtc_trav_cur) == 0u) {
+                        // Out of nodes. An instance goes back to the top level, whose data is made
+                        // anew.
+                        // Nothing waits there when it was the last entry: the ray is finished.
+                        bool top = !RTC_LINK_LEVELS || rtc_trav_instance == RTC_NONE || rtc_floor() == 0u;
+                        rtc_trav_cur = top ? RTC_REF_DONE : RTC_REF_SETUP;
+                        rtc_trav_instance = RTC_NONE;
+                        rtc_set_floor(0u);
+                        result = top ? RTC_STEP_DONE : RTC_STEP_RUNNING;
+                    } else if (RTC_LINK_LEVELS && rtc_trav_instance == RTC_NONE) {
+                        rtc_trav_instance = rtc_trav_cur & RTC_REF_INDEX_MASK;
+                        rtc_set_floor(rtc_sp());
+                        rtc_trav_cur = RTC_REF_ENTER;
                     } else {
-                        rtc_trav_sp--;
-                        rtc_trav_cur = rtc_stack_get(rtc_trav_sp);
+                        do {
+                            uint here = rtc_trav_cur;
+                            uint slot = rtc_next_slot();
+                            if (RTC_LINK_AABBS &&
+                                (!RTC_LINK_TRIANGLES || (rtc_trav_word & RTC_LEVEL_AABBS) != 0u)) {
+                                result = rtc_test_aabb(slot);
+                            } else if (RTC_LINK_TRIANGLES) {
+                                result = rtc_test_triangle(slot);
+                            }
+                            if (result == RTC_STEP_UNDECIDED) {
+                                rtc_trav_cur = here;
+                            }
+                            rtc_turns++;
+                        } while (result == RTC_STEP_RUNNING && rtc_trav_cur < RTC_REF_DONE);
                     }
                 }
-                if (rtc_inner(rtc_trav_cur)) {
-                    result = rtc_test_node();
-                }
-                rtc_turns++;
-            } while (RTC_WHILE_WHILE != 0u && result == RTC_STEP_RUNNING && !rtc_budget_spent() &&
-                     (rtc_inner(rtc_trav_cur) || rtc_trav_cur == RTC_REF_POP));
-
-            if (!rtc_inner(rtc_trav_cur) && rtc_trav_cur != RTC_REF_POP && result == RTC_STEP_RUNNING) {
-                if (rtc_trav_cur == RTC_REF_DONE) {
-                    result = RTC_STEP_DONE;
-                } else if (rtc_count(rtc_trav_cur) == 0u) {
-                    // Out of nodes. An instance goes back to the top level, whose data is made
-                    // anew.
-                    // Nothing waits there when it was the last entry: the ray is finished.
-                    bool top = !RTC_LINK_LEVELS || rtc_trav_instance == RTC_NONE || rtc_trav_floor == 0u;
-                    rtc_trav_cur = top ? RTC_REF_DONE : RTC_REF_POP;
-                    rtc_trav_instance = RTC_NONE;
-                    rtc_trav_floor = 0u;
-                    rtc_trav_setup = top ? 0u : 2u;
-                    result = top ? RTC_STEP_DONE : RTC_STEP_RUNNING;
-                } else if (RTC_LINK_LEVELS && rtc_trav_instance == RTC_NONE) {
-                    rtc_trav_instance = rtc_trav_cur & RTC_REF_INDEX_MASK;
-                    rtc_trav_floor = rtc_trav_sp;
-                    rtc_trav_cur = 0u;
-                    rtc_trav_setup = 2u;
-                } else {
-                    do {
-                        uint slot = rtc_trav_cur & RTC_REF_INDEX_MASK;
-                        rtc_trav_cur += 1u - (1u << RTC_REF_COUNT_SHIFT);
-                        rtc_trav_cur = rtc_count(rtc_trav_cur) == 0u ? RTC_REF_POP : rtc_trav_cur;
-                        if (RTC_LINK_AABBS &&
-                            (!RTC_LINK_TRIANGLES || (rtc_trav_bits & RTC_LEVEL_AABBS) != 0u)) {
-                            result = rtc_test_aabb(slot);
-                        } else if (RTC_LINK_TRIANGLES) {
-                            result = rtc_test_triangle(slot);
-                        }
-                        rtc_turns++;
-                    } while (result == RTC_STEP_RUNNING && rtc_trav_cur < RTC_REF_DONE);
-                }
             }
+        } while (result == RTC_STEP_RUNNING);
+#ifdef RTC_TIER_DEFERS
+        // Outside the loop that nearly all time goes to: what this needs is not kept in registers there.
+        if (RTC_LINK_TRIANGLES && result == RTC_STEP_UNDECIDED) {
+            result = rtc_settle_triangle(rtc_next_slot());
         }
+#endif
+        rtc_turns++;
     } while (result == RTC_STEP_RUNNING);
     if (result == RTC_STEP_OVERFLOW) {
         rtc_error(RTC_LAUNCH_ERROR_STACK, rtc_trav_instance, RTC_STACK_ENTRIES);
         rtc_trav_cur = RTC_REF_DONE;
         result = RTC_STEP_DONE;
+    }
+    if (result == RTC_STEP_DONE) {
+        rtc_hit_finish();
     }
     return result;
 }

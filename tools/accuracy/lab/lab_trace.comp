@@ -1,5 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 // A texel buffer without a sampler: SPIR-V 1.6 knows no sampled image of a buffer.
 #extension GL_EXT_samplerless_texture_functions : require
 // Traversal alone: one lane traces one ray from a buffer and writes what it
@@ -42,7 +43,7 @@ const uint LAB_PENDING = 0x80000000u; // in `suspensions`
 void lab_check_object_ray(inout uint mismatches) {
     vec3 o = rtc_object_ray_origin(rtc_ray_root, rtc_cand_instance, rtc_ray_origin);
     vec3 d = rtc_object_ray_direction(rtc_ray_root, rtc_cand_instance, rtc_ray_direction);
-    vec3 scaled = rtc_trav_direction * rtc_trav_t_up;
+    vec3 scaled = rtc_trav_direction * rtc_t_up();
     if (floatBitsToUint(o) != floatBitsToUint(rtc_trav_origin) || floatBitsToUint(d) != floatBitsToUint(scaled)) {
         mismatches++;
     }
@@ -127,12 +128,13 @@ void main() {
                 turns += rtc_turns;
                 rtc_ray_root = 0xdeadu;
                 rtc_hit_t = -1.0;
-                rtc_trav_sp = 77u;
+                rtc_trav_word = 77u;
                 rtc_trav_cur = 5u;
-                rtc_trav_nodes = 0u;
+                rtc_trav_base = 0u;
+                rtc_trav_tmin = 0.0;
                 rtc_trav_tmax = 0.0;
+                rtc_hit_kind = 99u;
                 rtc_trav_slots = 0u;
-                rtc_trav_records = 0u;
                 rtc_trav_origin = vec3(1e30);
                 rtc_trav_direction = vec3(0.0);
                 rtc_trav_inverse = vec3(1.0);
@@ -141,7 +143,7 @@ void main() {
             }
         }
         LabResult result;
-        result.t = rtc_hit_t;
+        result.t = rtc_hit_instance != RTC_NONE ? rtc_hit_t : rtc_ray_tmax;
         result.kind = rtc_hit_kind;
         result.instance = rtc_hit_instance;
         result.primitive = rtc_hit_primitive;

@@ -51,7 +51,7 @@ struct LocalRay {
     }
 };
 
-// The power of two of rtc_choose_scale.
+// The power of two of rtc_t_up.
 int direction_exponent(const Vec3& d) {
     const float largest = std::max({std::fabs(d.x), std::fabs(d.y), std::fabs(d.z)});
     if (largest >= 0x1p-30f && largest <= 0x1p30f) return 0;
