@@ -431,8 +431,8 @@ RTR_API VkResult rtrResetRecorder(RtrRecorder recorder);
  * Otherwise synchronisation is the application's, as in Vulkan: reads of inputs and reads and
  * writes of `dst` and scratch happen in COMPUTE_SHADER with SHADER_READ / SHADER_WRITE
  * (rtrTranslatePipelineStages/Access of the NV masks say the same).
- * PREFER_FAST_BUILD takes a Morton tree as it is; otherwise three passes of rotations bring
- * it near a SAH tree. LOW_MEMORY fills leaves, whether or not that makes tracing cheaper: the
+ * PREFER_FAST_BUILD takes a Morton tree as it is; otherwise two passes of rotations bring it
+ * near a SAH tree, and with PREFER_FAST_TRACE a third over bottom levels. LOW_MEMORY fills leaves, whether or not that makes tracing cheaper: the
  * compacted size is smaller by 12 to 22 percent, that of the object and of scratch stays.
  * An update may move vertices, boxes and instances, nothing else: geometries, their types,
  * flags, formats and counts, and which primitives are active (for instances: a reference that is
