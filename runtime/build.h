@@ -98,6 +98,9 @@ void rtr_forget_built(RtrAccelerationStructure as);
 /* Whether an update of what `src` was built of may be this. */
 VkResult rtr_check_update(RtrAccelerationStructure src, const VkAccelerationStructureInfoNV* info);
 
+/* RTR_PROPERTY_* that a query asks for. */
+VkResult rtr_property_of_query(RtrDevice d, VkQueryType type, uint32_t* what);
+
 /* Boxes of the primitives of a piece of the input. */
 VkResult rtr_emit_leaves(RtrBuild* b);
 /* Nodes there may be in a structure, compacted or not. */

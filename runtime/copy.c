@@ -84,27 +84,20 @@ VkResult rtrCmdCopyAccelerationStructure(RtrRecorder rec, RtrAccelerationStructu
     return VK_SUCCESS;
 }
 
-VkResult rtrCmdWriteAccelerationStructuresProperties(RtrRecorder rec, uint32_t count,
-                                                     const RtrAccelerationStructure* structures,
-                                                     VkQueryType type, VkBuffer dst, VkDeviceSize offset) {
-    RtrDevice d = rec->device;
-    uint32_t what, i;
-    if (!rec->cmd)
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "recorder-not-begun",
-                         "properties: rtrBeginRecorder first");
+VkResult rtr_property_of_query(RtrDevice d, VkQueryType type, uint32_t* what) {
     switch (type) {
         case VK_QUERY_TYPE_ACCELERATION_STRUCTURE_COMPACTED_SIZE_NV:
         case VK_QUERY_TYPE_ACCELERATION_STRUCTURE_COMPACTED_SIZE_KHR:
-            what = RTR_PROPERTY_COMPACTED_SIZE;
+            *what = RTR_PROPERTY_COMPACTED_SIZE;
             break;
         case VK_QUERY_TYPE_ACCELERATION_STRUCTURE_SERIALIZATION_SIZE_KHR:
-            what = RTR_PROPERTY_SERIALIZED_SIZE;
+            *what = RTR_PROPERTY_SERIALIZED_SIZE;
             break;
         case VK_QUERY_TYPE_ACCELERATION_STRUCTURE_SERIALIZATION_BOTTOM_LEVEL_POINTERS_KHR:
-            what = RTR_PROPERTY_HANDLES;
+            *what = RTR_PROPERTY_HANDLES;
             break;
         case VK_QUERY_TYPE_ACCELERATION_STRUCTURE_SIZE_KHR:
-            what = RTR_PROPERTY_SIZE;
+            *what = RTR_PROPERTY_SIZE;
             break;
         default:
             return rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "query-type",
@@ -112,6 +105,19 @@ VkResult rtrCmdWriteAccelerationStructuresProperties(RtrRecorder rec, uint32_t c
                              "SERIALIZATION_BOTTOM_LEVEL_POINTERS",
                              (int)type);
     }
+    return VK_SUCCESS;
+}
+
+VkResult rtrCmdWriteAccelerationStructuresProperties(RtrRecorder rec, uint32_t count,
+                                                     const RtrAccelerationStructure* structures,
+                                                     VkQueryType type, VkBuffer dst, VkDeviceSize offset) {
+    RtrDevice d = rec->device;
+    uint32_t what = RTR_PROPERTY_SIZE, i;
+    VkResult r;
+    if (!rec->cmd)
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "recorder-not-begun",
+                         "properties: rtrBeginRecorder first");
+    if ((r = rtr_property_of_query(d, type, &what)) != VK_SUCCESS) return r;
     if (!dst || offset % 8)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "query-buffer",
                          "dstBuffer missing, or dstOffset not a multiple of 8");
@@ -121,7 +127,6 @@ VkResult rtrCmdWriteAccelerationStructuresProperties(RtrRecorder rec, uint32_t c
         RtrBinding bindings[2] = {{1, RTR_ARR_OUT, {dst, begin, at + 8 - begin}},
                                   {1, RTR_ARR_DST_HEADER, {VK_NULL_HANDLE, 0, 0}}};
         struct RtrBuildPush push;
-        VkResult r;
         if (!as || !as->buffer)
             return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "not-bound", "structure %u is not bound", i);
         bindings[1].info = rtr_header_info(as);

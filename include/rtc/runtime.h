@@ -575,6 +575,44 @@ RTR_API VkResult rtrGetSerializedAccelerationStructureInfo(RtrDevice device, con
 RTR_API void rtrGetDeviceAccelerationStructureCompatibility(
     RtrDevice device, const uint8_t* pVersionData, VkAccelerationStructureCompatibilityKHR* pCompatibility);
 
+/* ---- Copies on the host ---------------------------------------------------------------
+ * The same on memory that the host sees: pDstMemory and pSrcMemory are the places of structures in
+ * mapped memory (where they are bound), or copies of as many bytes elsewhere. The device has
+ * finished writing what is read, and what is written is made visible to it as any host write is.
+ * Thread-safe for different destinations. */
+
+/* Clone or compact. Counterpart: vkCopyAccelerationStructureKHR.
+ * Errors: VALIDATION_FAILED for memory that holds no built structure, types, heaps, sizes. */
+RTR_API VkResult rtrCopyAccelerationStructureOnHost(RtrDevice device, RtrAccelerationStructure dst,
+                                                    void* pDstMemory, RtrAccelerationStructure src,
+                                                    const void* pSrcMemory,
+                                                    VkCopyAccelerationStructureModeNV mode);
+
+/* Writes a blob (dataSize bytes, at least what the query SERIALIZATION_SIZE answers) as
+ * rtrCmdCopyAccelerationStructureToMemory does. Counterpart: vkCopyAccelerationStructureToMemoryKHR.
+ * Errors: VALIDATION_FAILED for memory that holds no built structure, or too few bytes. */
+RTR_API VkResult rtrCopyAccelerationStructureToMemoryOnHost(RtrDevice device, RtrAccelerationStructure src,
+                                                            const void* pSrcMemory, size_t dataSize,
+                                                            void* pData);
+
+/* Makes a bottom level of a blob; top levels are read on the device, which sees their bottom
+ * levels. Counterpart: vkCopyMemoryToAccelerationStructureKHR.
+ * Errors: those of rtrGetSerializedAccelerationStructureInfo; VALIDATION_FAILED for top levels,
+ * damaged blobs, and a dst that is too small. */
+RTR_API VkResult rtrCopyMemoryToAccelerationStructureOnHost(RtrDevice device, size_t dataSize,
+                                                            const void* pData, RtrAccelerationStructure dst,
+                                                            void* pDstMemory);
+
+/* Writes one uint64_t per structure, `stride` bytes apart, as
+ * rtrCmdWriteAccelerationStructuresProperties does. ppMemory: the memory of each.
+ * Counterpart: vkWriteAccelerationStructuresPropertiesKHR.
+ * Errors: FEATURE_NOT_PRESENT for other queries; VALIDATION_FAILED for memory that holds no built
+ * structure, or too few bytes for the answers. */
+RTR_API VkResult rtrWriteAccelerationStructuresPropertiesOnHost(
+    RtrDevice device, uint32_t accelerationStructureCount,
+    const RtrAccelerationStructure* pAccelerationStructures, const void* const* ppMemory,
+    VkQueryType queryType, size_t dataSize, void* pData, size_t stride);
+
 /* ---- Pipelines ---------------------------------------------------------------------- */
 
 typedef struct RtrRayTracingPipelineCreateInfo {
