@@ -47,19 +47,19 @@ void Machine::freeze_link_constants(const std::map<uint32_t, uint32_t>& values) 
 Id Machine::function(const std::string& name) const { return variable(name); }
 
 Id Machine::find_export(const std::string& name) const {
-    const auto found = exports_.find(name);
-    return found == exports_.end() ? 0 : found->second;
+    const auto found = exports_->find(name);
+    return found == exports_->end() ? 0 : imported_.get(found->second);
 }
 
 Id Machine::variable(const std::string& name) const {
-    const auto found = exports_.find(name);
-    if (found == exports_.end()) ir::fail("internal-traversal", "", 0, "the traversal module does not export " + name);
-    return found->second;
+    const Id id = find_export(name);
+    if (!id) ir::fail("internal-traversal", "", 0, "the traversal module does not export " + name);
+    return id;
 }
 
 Id Machine::call(Emitter& e, const std::string& name, const std::vector<Id>& arguments) const {
     const Id id = function(name);
-    return e.call(id, export_types_.at(id), arguments);
+    return e.call(id, export_types_.get(id), arguments);
 }
 
 Id Machine::load(Emitter& e, const std::string& name) const {

@@ -10,6 +10,7 @@
 #pragma once
 
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -43,6 +44,9 @@ struct State {
     std::string name;           // "name", "name.1", ... for dumps
     std::vector<Block> blocks;  // every path ends in a branch to Machine::dispatch
 };
+
+// Functions, and module-scope variables each reads or writes.
+using TouchedVariables = std::vector<std::pair<Id, std::set<Id>>>;
 
 class Machine {
   public:
@@ -155,8 +159,10 @@ class Machine {
 
     std::vector<Inst> variables_;
     std::vector<Id> payload_words_, callable_words_, frame_words_;
-    std::map<std::string, Id> exports_;
-    std::map<Id, Id> export_types_;  // result types of traversal functions
+    const std::map<std::string, Id>* exports_ = nullptr;  // as the prepared module numbers them
+    const TouchedVariables* touched_ = nullptr;           // likewise
+    ir::IdMap<Id> imported_;                              // prepared module's id -> here
+    ir::IdMap<Id> export_types_;                          // result types of traversal functions
 };
 
 // traversal_import.cpp

@@ -35,80 +35,102 @@ std::vector<Id> Machine::carried_variables(const std::vector<Function>& stage_fu
     candidates.insert(candidates.end(), stage_variables.begin(), stage_variables.end());
     candidates.push_back(record);
     // A pending candidate, read by any-hit and intersection shaders.
-    for (const auto& [name, id] : exports_)
-        if (name.rfind("rtc_cand_", 0) == 0) candidates.push_back(id);
-    ir::IdSet candidate_set;
-    for (Id id : candidates) candidate_set.insert(id);
+    for (const auto& [name, id] : *exports_)
+        if (name.rfind("rtc_cand_", 0) == 0) candidates.push_back(imported_.get(id));
+    ir::IdMap<uint32_t> number;  // of a candidate, plus one
+    for (size_t i = 0; i < candidates.size(); ++i) number[candidates[i]] = static_cast<uint32_t>(i + 1);
+    // Sets of candidates.
+    const size_t words = candidates.size() / 64 + 1;
+    using Set = std::vector<uint64_t>;
+    auto add = [](Set& set, uint32_t n) { set[n / 64] |= uint64_t{1} << n % 64; };
+    auto remove = [](Set& set, uint32_t n) { set[n / 64] &= ~(uint64_t{1} << n % 64); };
+    auto join = [](Set& to, const Set& from) {
+        uint64_t fresh = 0;
+        for (size_t i = 0; i < from.size(); ++i) {
+            fresh |= from[i] & ~to[i];
+            to[i] |= from[i];
+        }
+        return fresh != 0;
+    };
 
     // What each function touches: itself, then through what it calls (there is no recursion, so this settles).
-    std::map<Id, std::set<Id>> touched;
+    std::vector<Set> touched;
+    ir::IdMap<uint32_t> function_index;  // in `touched`, plus one
     std::vector<std::pair<Id, Id>> calls;
-    for (const std::vector<Function>* functions : {&stage_functions, &traversal_functions, &helper_functions})
+    // (Traversal's functions know nothing but candidates.)
+    for (const auto& [function, variables] : *touched_) {
+        Set& set = touched.emplace_back(words);
+        function_index[imported_.get(function)] = static_cast<uint32_t>(touched.size());
+        for (Id id : variables) add(set, number.get(imported_.get(id)) - 1);
+    }
+    for (const std::vector<Function>* functions : {&stage_functions, &helper_functions})
         for (const Function& function : *functions) {
-            std::set<Id>& set = touched[function.id()];
+            Set& set = touched.emplace_back(words);
+            function_index[function.id()] = static_cast<uint32_t>(touched.size());
             for (const Block& block : function.blocks)
                 for (const Inst& inst : block.insts) {
                     if (inst.op == Op::OpFunctionCall) calls.push_back({function.id(), inst.ops[0]});
                     inst.for_each_id([&](Id id) {
-                        if (candidate_set.contains(id)) set.insert(id);
+                        if (const uint32_t n = number.get(id)) add(set, n - 1);
                     });
                 }
         }
     for (bool changed = true; changed;) {
         changed = false;
-        for (const auto& [caller, callee] : calls) {
-            const auto from = touched.find(callee);
-            if (from == touched.end() || from->second.empty()) continue;
-            std::set<Id>& to = touched[caller];
-            const size_t before = to.size();
-            to.insert(from->second.begin(), from->second.end());
-            changed |= to.size() != before;
-        }
+        for (const auto& [caller, callee] : calls)
+            if (const uint32_t from = function_index.get(callee))
+                changed |= join(touched[function_index.get(caller) - 1], touched[from - 1]);
     }
 
-    std::set<Id> carried;
+    Set live_first(words);
     for (const State& state : states) {
         // Blocks of a state are in an order in which each follows its dominators; one backward pass per
         // iteration settles quickly.
-        std::map<Id, std::set<Id>> live_in;
+        std::map<Id, Set> live_in;
+        Set live(words);
+        std::map<Id, uint32_t> base;  // the candidate an access chain leads into, plus one
         for (bool changed = true; changed;) {
             changed = false;
             for (auto block = state.blocks.rbegin(); block != state.blocks.rend(); ++block) {
-                std::set<Id> live;
-                for (Id successor : block->successors())
-                    if (const auto found = live_in.find(successor); found != live_in.end())
-                        live.insert(found->second.begin(), found->second.end());
-                std::map<Id, Id> base;
+                std::fill(live.begin(), live.end(), 0);
+                block->for_each_successor([&](Id successor) {
+                    if (const auto found = live_in.find(successor); found != live_in.end()) join(live, found->second);
+                });
+                base.clear();
                 for (const Inst& inst : block->insts)
-                    if ((inst.op == Op::OpAccessChain || inst.op == Op::OpInBoundsAccessChain) &&
-                        (candidate_set.count(inst.ops[0]) || base.count(inst.ops[0])))
-                        base[inst.result] = candidate_set.count(inst.ops[0]) ? inst.ops[0] : base[inst.ops[0]];
+                    if (inst.op == Op::OpAccessChain || inst.op == Op::OpInBoundsAccessChain) {
+                        uint32_t into = number.get(inst.ops[0]);
+                        if (const auto found = base.find(inst.ops[0]); !into && found != base.end()) into = found->second;
+                        if (into) base[inst.result] = into;
+                    }
                 for (auto inst = block->insts.rbegin(); inst != block->insts.rend(); ++inst) {
-                    if (inst->op == Op::OpStore && candidate_set.count(inst->ops[0])) live.erase(inst->ops[0]);
+                    if (inst->op == Op::OpStore)
+                        if (const uint32_t n = number.get(inst->ops[0])) remove(live, n - 1);
                     if (inst->op == Op::OpAccessChain || inst->op == Op::OpInBoundsAccessChain) {
                         for (size_t i = 1; i < inst->ops.size(); ++i)
-                            if (candidate_set.count(inst->ops[i])) live.insert(inst->ops[i]);
+                            if (const uint32_t n = number.get(inst->ops[i])) add(live, n - 1);
                         continue;
                     }
                     for (size_t i = inst->op == Op::OpStore ? 1 : 0; i < inst->ops.size(); ++i) {
-                        if (candidate_set.count(inst->ops[i])) live.insert(inst->ops[i]);
-                        if (const auto found = base.find(inst->ops[i]); found != base.end()) live.insert(found->second);
+                        if (const uint32_t n = number.get(inst->ops[i])) add(live, n - 1);
+                        if (base.empty()) continue;
+                        if (const auto found = base.find(inst->ops[i]); found != base.end()) add(live, found->second - 1);
                     }
-                    if (inst->op == Op::OpFunctionCall) {
-                        const auto found = touched.find(inst->ops[0]);
-                        if (found != touched.end()) live.insert(found->second.begin(), found->second.end());
-                    }
+                    if (inst->op == Op::OpFunctionCall)
+                        if (const uint32_t callee = function_index.get(inst->ops[0])) join(live, touched[callee - 1]);
                 }
-                std::set<Id>& known = live_in[block->label];
+                Set& known = live_in.try_emplace(block->label, words).first->second;
                 if (live != known) {
-                    known = std::move(live);
+                    known = live;
                     changed = true;
                 }
             }
         }
-        const std::set<Id>& first = live_in[state.blocks.front().label];
-        carried.insert(first.begin(), first.end());
+        join(live_first, live_in.at(state.blocks.front().label));
     }
+    std::set<Id> carried;
+    for (size_t i = 0; i < candidates.size(); ++i)
+        if (live_first[i / 64] >> i % 64 & 1) carried.insert(candidates[i]);
     // The dispatcher's own.
     carried.insert({ret, depth, callable_depth, callable_ret, fresh, report_return, record});
     carried.erase(state);

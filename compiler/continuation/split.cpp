@@ -578,7 +578,7 @@ class Splitter {
         site.line = inst.source.line;
         if (pushes_frame(inst)) {
             for (const LiveVariable& live : live_[block.label]) {
-                const std::string name = p_.module.name_of(live.variable);
+                const std::string name = p_.name_of(live.variable);
                 for_each_live(e, live, [&](Id pointer, Id type) {
                     for (Id word : e.to_words(e.load(type, pointer), type)) e.store(m_.frame_word(count++), word);
                 });

@@ -4,6 +4,7 @@
 // process and kept: small pipelines would spend most of their time on it otherwise.
 #include <memory>
 #include <mutex>
+#include <set>
 
 #include "continuation/machine.h"
 #include "ir/cleanup.h"
@@ -201,7 +202,32 @@ ir::Module prepare(const ir::Module& words, const std::map<uint32_t, uint32_t>& 
 struct Prepared {
     ir::Module module;
     std::map<std::string, Id> exports;
+    TouchedVariables touched;
 };
+
+// Which of the exported variables of a pending candidate each function reads or writes, itself or by calls.
+TouchedVariables touched_candidates(const ir::Module& module, const std::map<std::string, Id>& exports) {
+    ir::IdSet candidates;
+    for (const auto& [name, id] : exports)
+        if (name.rfind("rtc_cand_", 0) == 0) candidates.insert(id);
+    std::map<Id, std::set<Id>> touched;
+    std::vector<std::pair<Id, Id>> calls;
+    for (const Function& function : module.functions)
+        for (const Block& block : function.blocks)
+            for (const Inst& inst : block.insts) {
+                if (inst.op == Op::OpFunctionCall) calls.push_back({function.id(), inst.ops[0]});
+                inst.for_each_id([&](Id id) {
+                    if (candidates.contains(id)) touched[function.id()].insert(id);
+                });
+            }
+    // There is no recursion, so this settles.
+    for (bool changed = true; changed;) {
+        changed = false;
+        for (const auto& [caller, callee] : calls)
+            for (Id id : std::set<Id>(touched[callee])) changed |= touched[caller].insert(id).second;
+    }
+    return {touched.begin(), touched.end()};
+}
 
 // Prepared modules live as long as the process; there are as many as combinations of choices that occur.
 const Prepared& prepared(const TraversalModule& module, const std::map<uint32_t, uint32_t>& choices) {
@@ -213,6 +239,7 @@ const Prepared& prepared(const TraversalModule& module, const std::map<uint32_t,
         auto fresh = std::make_unique<Prepared>();
         fresh->module = prepare(ir::read_module({module.words, module.words + module.count}, "traversal"), choices);
         fresh->exports = exports_of(fresh->module);
+        fresh->touched = touched_candidates(fresh->module, fresh->exports);
         entry = std::move(fresh);
     }
     return *entry;
@@ -223,11 +250,11 @@ const Prepared& prepared(const TraversalModule& module, const std::map<uint32_t,
 void Machine::import_traversal(const TraversalModule& module, const std::map<uint32_t, uint32_t>& choices) {
     const Prepared& known = prepared(module, choices);
     const ir::Module& source = known.module;
-    ir::IdMap<Id> map;
-    traversal_functions = p.import(source, map);
+    traversal_functions = p.import(source, imported_);
     p.module.version = source.version;
     if (module.addresses) p.module.addressing = source.addressing;
-    for (const auto& [name, id] : known.exports) exports_.emplace(name, map.get(id));
+    exports_ = &known.exports;
+    touched_ = &known.touched;
     for (const Function& function : traversal_functions) export_types_[function.id()] = function.def.type;
     for (const Inst& inst : p.module.globals)
         if (inst.op == Op::OpVariable) {

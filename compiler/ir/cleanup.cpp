@@ -108,8 +108,9 @@ void fold_constant_branches(const Program& program, Function& function) {
     while (!work.empty()) {
         const Block& block = function.blocks[index.get(work.back()) - 1];
         work.pop_back();
-        for (Id next : block.successors())
+        block.for_each_successor([&](Id next) {
             if (reached.insert(next)) work.push_back(next);
+        });
     }
     std::map<Id, Id> back_edges;  // unreached continue target -> its loop's header
     for (const Block& block : function.blocks)
@@ -134,7 +135,7 @@ void fold_constant_branches(const Program& program, Function& function) {
     // Phis name exactly the predecessors there are.
     std::map<Id, IdSet> predecessors;
     for (const Block& block : function.blocks)
-        for (Id next : block.successors()) predecessors[next].insert(block.label);
+        block.for_each_successor([&](Id next) { predecessors[next].insert(block.label); });
     for (Block& block : function.blocks)
         for (Inst& phi : block.insts) {
             if (phi.op != Op::OpPhi) break;
@@ -176,7 +177,7 @@ void forward_local_loads(const Program& program, Function& function) {
             if (inst.op == Op::OpLoad && simple.contains(inst.ops[0])) {
                 auto [value, fresh] = known.emplace(inst.ops[0], inst.result);
                 // A decorated load says something of its own: that an index is not uniform, for one.
-                if (fresh || !program.decorations_of(inst.result).empty()) continue;
+                if (fresh || program.is_decorated(inst.result)) continue;
                 replaced[inst.result] = value->second;
                 any = true;
                 inst.op = Op::OpNop;
@@ -248,7 +249,7 @@ void merge_blocks(Function& function) {
     IdMap<uint32_t> arrivals;
     IdSet named;
     for (const Block& block : function.blocks) {
-        for (Id next : block.successors()) ++arrivals[next];
+        block.for_each_successor([&](Id next) { ++arrivals[next]; });
         if (const Inst* merge = block.merge())
             for (size_t i = 0; i < (merge->op == Op::OpLoopMerge ? 2u : 1u); ++i) named.insert(merge->ops[i]);
     }

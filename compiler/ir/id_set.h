@@ -29,6 +29,10 @@ class IdSet {
         if (contains(id)) bits_[id >> 6] &= ~(uint64_t{1} << (id & 63));
     }
 
+    void reserve(uint32_t bound) {
+        if (bits_.size() < bound / 64 + 1) bits_.resize(bound / 64 + 1, 0);
+    }
+
   private:
     std::vector<uint64_t> bits_;
 };
@@ -46,6 +50,10 @@ class IdMap {
         return id < values_.size() ? values_[id] : none;
     }
     void clear() { values_.clear(); }
+    // Room for ids below `bound`, made at once.
+    void reserve(uint32_t bound) {
+        if (values_.size() < bound) values_.resize(bound);
+    }
 
   private:
     std::vector<T> values_;

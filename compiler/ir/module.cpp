@@ -43,6 +43,34 @@ constexpr auto kIndex = [] {
 
 }  // namespace
 
+namespace operands {
+namespace {
+
+constexpr Shape shape_of(const char* pattern) {
+    Shape shape;
+    while (*pattern == 'r' && pattern[1] != '*') {
+        ++shape.leading;
+        pattern += pattern[1] == '?' ? 2 : 1;
+    }
+    if (pattern[0] == 'r' && pattern[1] == '*' && !pattern[2])
+        shape.rest = Rest::Ids;
+    else
+        for (; *pattern; ++pattern)
+            if (*pattern != 'l' && *pattern != '*' && *pattern != '?') shape.rest = Rest::Mixed;
+    return shape;
+}
+
+}  // namespace
+
+constinit const std::array<Shape, kShapeCount> kShapes = [] {
+    std::array<Shape, kShapeCount> shapes{};
+    for (const Row& row : kRows)
+        if (row.value < shapes.size()) shapes[row.value] = shape_of(row.info.pattern);
+    return shapes;
+}();
+
+}  // namespace operands
+
 const OpInfo* op_info(Op op) {
     const auto value = static_cast<uint32_t>(op);
     const uint16_t row = value < kIndex.size() ? kIndex[value] : uint16_t{0};
@@ -73,21 +101,7 @@ const Inst* Block::merge() const {
 
 std::vector<Id> Block::successors() const {
     std::vector<Id> out;
-    if (insts.empty()) return out;
-    const Inst& last = insts.back();
-    switch (last.op) {
-        case Op::OpBranch: out.push_back(last.ops[0]); break;
-        case Op::OpBranchConditional:
-            out.push_back(last.ops[1]);
-            out.push_back(last.ops[2]);
-            break;
-        case Op::OpSwitch:
-            out.push_back(last.ops[1]);
-            for (size_t i = 2 + last.switch_words; i < last.ops.size(); i += last.switch_words + 1)
-                out.push_back(last.ops[i]);
-            break;
-        default: break;
-    }
+    for_each_successor([&](Id label) { out.push_back(label); });
     return out;
 }
 

@@ -67,6 +67,20 @@ struct Block {
     const Inst* merge() const;
     // Labels the terminator names, in order, duplicates kept.
     std::vector<Id> successors() const;
+    template <typename Fn>
+    void for_each_successor(Fn&& fn) const {
+        if (insts.empty()) return;
+        const Inst& last = insts.back();
+        if (last.op == Op::OpBranch) {
+            fn(last.ops[0]);
+        } else if (last.op == Op::OpBranchConditional) {
+            fn(last.ops[1]);
+            fn(last.ops[2]);
+        } else if (last.op == Op::OpSwitch) {
+            fn(last.ops[1]);
+            for (size_t i = 2 + last.switch_words; i < last.ops.size(); i += last.switch_words + 1u) fn(last.ops[i]);
+        }
+    }
 };
 
 struct Function {

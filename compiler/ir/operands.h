@@ -1,10 +1,22 @@
 // Which operand words of an instruction are ids, by the grammar's patterns. Included by ir/module.h.
 #pragma once
 
+#include <algorithm>
+#include <array>
+
 #include "ir/module.h"
 
 namespace rtc::ir {
 namespace operands {
+
+// What most patterns come to: so many ids first, then only ids, none, or what takes the pattern to tell.
+enum class Rest : uint8_t { None, Ids, Mixed };
+struct Shape {
+    uint8_t leading = 0;
+    Rest rest = Rest::None;
+};
+inline constexpr size_t kShapeCount = 8192;  // opcodes from here on have no known operands
+extern const std::array<Shape, kShapeCount> kShapes;
 
 inline constexpr uint32_t kMaskParameters_MemoryAccess_Id = 0x8 | 0x10 | 0x10000 | 0x20000;
 inline constexpr uint32_t kMemoryAligned = 0x2;
@@ -104,14 +116,32 @@ void visit_ids(Op op, const char* pattern, Words& words, uint32_t switch_words, 
 
 }  // namespace operands
 
+namespace operands {
+
+template <typename Words, typename Fn>
+void for_each_id(Op op, Words& words, uint32_t switch_words, const Fn& fn) {
+    const auto number = static_cast<uint32_t>(op);
+    const Shape shape = number < kShapeCount ? kShapes[number] : Shape{};
+    auto* const data = words.data();
+    const size_t n = words.size();
+    if (shape.rest == Rest::Mixed && n > shape.leading) {
+        visit_ids(op, op_info(op)->pattern, words, switch_words, fn);
+        return;
+    }
+    const size_t ids = shape.rest == Rest::Ids ? n : std::min<size_t>(n, shape.leading);
+    for (size_t i = 0; i < ids; ++i) fn(data[i]);
+}
+
+}  // namespace operands
+
 template <typename Fn>
 void Inst::for_each_id(Fn&& fn) {
-    if (const OpInfo* info = op_info(op)) operands::visit_ids(op, info->pattern, ops, switch_words, fn);
+    operands::for_each_id(op, ops, switch_words, fn);
 }
 
 template <typename Fn>
 void Inst::for_each_id(Fn&& fn) const {
-    if (const OpInfo* info = op_info(op)) operands::visit_ids(op, info->pattern, ops, switch_words, fn);
+    operands::for_each_id(op, ops, switch_words, fn);
 }
 
 }  // namespace rtc::ir

@@ -39,23 +39,21 @@ void append_word(std::string& key, uint32_t word) { key.append(reinterpret_cast<
 
 }  // namespace
 
-std::string Program::key_of(const Inst& inst, const std::string& extra) {
-    std::string key;
-    append_word(key, static_cast<uint32_t>(inst.op));
-    append_word(key, inst.type);
-    for (uint32_t word : inst.ops) append_word(key, word);
-    key += '|';
-    key += extra;
-    return key;
+const std::string& Program::key_of(const Inst& inst, const std::string& extra) {
+    key_.clear();
+    append_word(key_, static_cast<uint32_t>(inst.op));
+    append_word(key_, inst.type);
+    key_.append(reinterpret_cast<const char*>(inst.ops.data()), 4 * inst.ops.size());
+    key_ += '|';
+    key_ += extra;
+    return key_;
 }
 
-Id Program::intern(Inst inst, const std::string& extra_key) {
-    const std::string key = key_of(inst, extra_key);
-    const auto found = interned_.find(key);
-    if (found != interned_.end()) return found->second;
-    const Id id = add_global(std::move(inst));
-    interned_.emplace(key, id);
-    return id;
+Id Program::intern(Inst inst) {
+    const std::string& key = key_of(inst, {});
+    const auto [known, fresh] = interned_.try_emplace(key, 0);
+    if (fresh) known->second = add_global(std::move(inst));
+    return known->second;
 }
 
 Id Program::add_global(Inst inst) {
@@ -214,29 +212,45 @@ Id Program::add_variable(spv::StorageClass storage, Id pointee, const std::strin
 void Program::decorate(Id target, spv::Decoration decoration, std::vector<uint32_t> operands) {
     Inst inst(Op::OpDecorate, 0, 0, {target, static_cast<uint32_t>(decoration)});
     inst.ops.insert(inst.ops.end(), operands.begin(), operands.end());
-    decoration_index_[target].push_back(module.decorations.size());
     module.decorations.push_back(std::move(inst));
+    chain_decoration(target);
 }
 
 void Program::member_decorate(Id target, uint32_t member, spv::Decoration decoration, std::vector<uint32_t> operands) {
     Inst inst(Op::OpMemberDecorate, 0, 0, {target, member, static_cast<uint32_t>(decoration)});
     inst.ops.insert(inst.ops.end(), operands.begin(), operands.end());
-    decoration_index_[target].push_back(module.decorations.size());
     module.decorations.push_back(std::move(inst));
+    chain_decoration(target);
+}
+
+void Program::chain_decoration(Id target) {
+    const auto place = static_cast<uint32_t>(module.decorations.size());
+    decoration_next_.resize(place, 0);
+    Chain& chain = decoration_chains_[target];
+    if (chain.last)
+        decoration_next_[chain.last - 1] = place;
+    else
+        chain.first = place;
+    chain.last = place;
 }
 
 std::vector<const Inst*> Program::decorations_of(Id id) const {
     std::vector<const Inst*> out;
-    const auto found = decoration_index_.find(id);
-    if (found != decoration_index_.end())
-        for (size_t index : found->second) out.push_back(&module.decorations[index]);
+    for_each_decoration(id, [&](const Inst& inst) { out.push_back(&inst); });
     return out;
 }
 
+bool Program::is_decorated(Id id) const {
+    bool any = false;
+    for_each_decoration(id, [&](const Inst&) { any = true; });
+    return any;
+}
+
 bool Program::decoration(Id id, spv::Decoration decoration, uint32_t* operand) const {
-    for (const Inst* inst : decorations_of(id)) {
-        if (inst->op != Op::OpDecorate || inst->ops[1] != static_cast<uint32_t>(decoration)) continue;
-        if (operand && inst->ops.size() > 2) *operand = inst->ops[2];
+    for (uint32_t at = decoration_chains_.get(id).first; at; at = decoration_next_[at - 1]) {
+        const Inst& inst = module.decorations[at - 1];
+        if (inst.op != Op::OpDecorate || inst.ops[1] != static_cast<uint32_t>(decoration)) continue;
+        if (operand && inst.ops.size() > 2) *operand = inst.ops[2];
         return true;
     }
     return false;
@@ -262,12 +276,28 @@ void Program::copy_decorations(Id from, Id to) {
 }
 
 void Program::remove_decorations(Id id, spv::Decoration decoration) {
-    std::vector<size_t>& indices = decoration_index_[id];
-    for (size_t index : indices) {
-        Inst& inst = module.decorations[index];
+    for (uint32_t at = decoration_chains_.get(id).first; at; at = decoration_next_[at - 1]) {
+        Inst& inst = module.decorations[at - 1];
         if (inst.op == Op::OpDecorate && inst.ops[1] == static_cast<uint32_t>(decoration)) inst.op = Op::OpNop;
     }
-    std::erase_if(indices, [&](size_t index) { return module.decorations[index].op == Op::OpNop; });
+}
+
+void Program::see_names() {
+    for (; names_seen_ < module.names.size(); ++names_seen_) {
+        const Inst& inst = module.names[names_seen_];
+        named_.insert(inst.ops[0]);
+        if (inst.op != Op::OpName) continue;
+        uint32_t& first = name_index_[inst.ops[0]];
+        if (!first) first = static_cast<uint32_t>(names_seen_ + 1);
+    }
+}
+
+std::string Program::name_of(Id id) {
+    see_names();
+    const uint32_t at = name_index_.get(id);
+    if (!at) return {};
+    const Inst& inst = module.names[at - 1];
+    return words_string(inst.ops.data() + 1, inst.ops.size() - 1);
 }
 
 uint32_t Program::file_index(const std::string& name) {
@@ -283,9 +313,17 @@ void Program::reindex() {
     for (size_t i = 0; i < module.globals.size(); ++i)
         if (module.globals[i].result) global_index_[module.globals[i].result] = static_cast<uint32_t>(i + 1);
     std::erase_if(module.decorations, [](const Inst& inst) { return inst.op == Op::OpNop; });
-    decoration_index_.clear();
-    for (size_t i = 0; i < module.decorations.size(); ++i)
-        decoration_index_[module.decorations[i].ops[0]].push_back(i);
+    named_ = {};
+    name_index_.clear();
+    names_seen_ = 0;
+    decoration_chains_.clear();
+    decoration_next_.assign(module.decorations.size(), 0);
+    for (size_t i = 0; i < module.decorations.size(); ++i) {
+        Chain& chain = decoration_chains_[module.decorations[i].ops[0]];
+        const auto place = static_cast<uint32_t>(i + 1);
+        (chain.last ? decoration_next_[chain.last - 1] : chain.first) = place;
+        chain.last = place;
+    }
 }
 
 std::vector<Function> Program::import(const Module& source, IdMap<Id>& map) {
@@ -294,11 +332,14 @@ std::vector<Function> Program::import(const Module& source, IdMap<Id>& map) {
         if (!known) known = module.new_id();
         return known;
     };
-    std::unordered_map<Id, std::vector<const Inst*>> decorations;
-    IdSet decorated;
-    for (const Inst& inst : source.decorations) {
-        decorated.insert(inst.ops[0]);
-        decorations[inst.ops[0]].push_back(&inst);
+    // Of each id in `source`: its first and its last decoration, and from each the next; places plus one.
+    IdMap<Chain> decorations;
+    std::vector<uint32_t> next(source.decorations.size(), 0);
+    for (size_t i = 0; i < source.decorations.size(); ++i) {
+        Chain& chain = decorations[source.decorations[i].ops[0]];
+        const auto place = static_cast<uint32_t>(i + 1);
+        (chain.last ? next[chain.last - 1] : chain.first) = place;
+        chain.last = place;
     }
 
     for (spv::Capability capability : source.capabilities) module.add_capability(capability);
@@ -316,16 +357,13 @@ std::vector<Function> Program::import(const Module& source, IdMap<Id>& map) {
     }
 
     auto add_decorations = [&](Id from, Id to) {
-        if (!decorated.contains(from)) return;
-        const auto found = decorations.find(from);
-        if (found == decorations.end()) return;
-        for (const Inst* inst : found->second) {
-            Inst copy = *inst;
+        for (uint32_t at = decorations.get(from).first; at; at = next[at - 1]) {
+            Inst copy = source.decorations[at - 1];
             copy.ops[0] = to;
             if (copy.op == Op::OpDecorateId)
                 for (size_t i = 2; i < copy.ops.size(); ++i) copy.ops[i] = mapped(copy.ops[i]);
-            decoration_index_[to].push_back(module.decorations.size());
             module.decorations.push_back(std::move(copy));
+            chain_decoration(to);
         }
     };
 
@@ -347,27 +385,25 @@ std::vector<Function> Program::import(const Module& source, IdMap<Id>& map) {
         if (is_internable(inst.op) && !forward_pointers.count(inst.result)) {
             // Decorations are part of a type's meaning (Block, Offset, ArrayStride, ...).
             std::string extra;
-            const auto found = decorations.find(inst.result);
-            if (found != decorations.end()) {
+            if (uint32_t at = decorations.get(inst.result).first) {
                 std::vector<std::string> parts;
-                for (const Inst* d : found->second) {
+                for (; at; at = next[at - 1]) {
+                    const Inst& d = source.decorations[at - 1];
                     std::string part;
-                    append_word(part, static_cast<uint32_t>(d->op));
-                    for (size_t i = 1; i < d->ops.size(); ++i) append_word(part, d->ops[i]);
+                    append_word(part, static_cast<uint32_t>(d.op));
+                    for (size_t i = 1; i < d.ops.size(); ++i) append_word(part, d.ops[i]);
                     parts.push_back(std::move(part));
                 }
                 std::sort(parts.begin(), parts.end());
                 for (const std::string& part : parts) extra += part + ";";
             }
             copy.result = 0;
-            const std::string key = key_of(copy, extra);
-            const auto known = interned_.find(key);
-            if (known != interned_.end()) {
+            const auto [known, fresh] = interned_.try_emplace(key_of(copy, extra), 0);
+            if (!fresh) {
                 map[inst.result] = known->second;
                 continue;
             }
-            copy.result = mapped(inst.result);
-            interned_.emplace(key, copy.result);
+            copy.result = known->second = mapped(inst.result);
             add_decorations(inst.result, copy.result);
             add_global(std::move(copy));
             continue;
@@ -400,7 +436,7 @@ std::vector<Function> Program::import(const Module& source, IdMap<Id>& map) {
         functions.push_back(std::move(copy));
     }
 
-    for (; names_seen_ < module.names.size(); ++names_seen_) named_.insert(module.names[names_seen_].ops[0]);
+    see_names();
     for (const Inst& inst : source.names) {
         const Id to = map.get(inst.ops[0]);
         if (!to || named_.contains(to)) continue;

@@ -68,11 +68,20 @@ class Program {
     Id add_variable(spv::StorageClass storage, Id pointee, const std::string& name);
     void decorate(Id target, spv::Decoration decoration, std::vector<uint32_t> operands = {});
     void member_decorate(Id target, uint32_t member, spv::Decoration decoration, std::vector<uint32_t> operands = {});
+    // In the order they were made.
+    template <typename Fn>
+    void for_each_decoration(Id id, Fn&& fn) const {
+        for (uint32_t at = decoration_chains_.get(id).first; at; at = decoration_next_[at - 1])
+            if (const Inst& inst = module.decorations[at - 1]; inst.op != Op::OpNop) fn(inst);
+    }
+    bool is_decorated(Id id) const;
     std::vector<const Inst*> decorations_of(Id id) const;
     bool decoration(Id id, spv::Decoration decoration, uint32_t* operand = nullptr) const;
     bool member_decoration(Id id, uint32_t member, spv::Decoration decoration, uint32_t* operand = nullptr) const;
     void copy_decorations(Id from, Id to);  // for a clone of a value; member decorations stay behind
     void remove_decorations(Id id, spv::Decoration decoration);
+
+    std::string name_of(Id id);  // OpName or "", without a search
 
     // Source file index in module.files for `name`.
     uint32_t file_index(const std::string& name);
@@ -88,19 +97,29 @@ class Program {
     Id push_words = 0;
     std::map<Id, Id> header_arrays;
 
-    // Rebuilds lookup tables after passes edited module.globals or module.decorations directly.
+    // Rebuilds lookup tables after passes edited module.globals, module.names or module.decorations directly.
     void reindex();
 
   private:
-    Id intern(Inst inst, const std::string& extra_key = {});
-    static std::string key_of(const Inst& inst, const std::string& extra);
+    Id intern(Inst inst);
+    // Good until the next call.
+    const std::string& key_of(const Inst& inst, const std::string& extra);
 
     std::unordered_map<std::string, Id> interned_;
+    std::string key_;
     IdMap<uint32_t> global_index_;  // index plus one
-    std::unordered_map<Id, std::vector<size_t>> decoration_index_;
+    // Decorations of one target are chained: places in module.decorations plus one, 0 for none.
+    struct Chain {
+        uint32_t first = 0, last = 0;
+    };
+    void chain_decoration(Id target);  // the one just pushed to module.decorations
+    IdMap<Chain> decoration_chains_;
+    std::vector<uint32_t> decoration_next_;
     std::map<std::string, uint32_t> file_index_;
     std::map<std::string, Id> ext_sets_;
-    IdSet named_;  // targets of the first names_seen_ names
+    void see_names();
+    IdSet named_;                // targets of the first names_seen_ names
+    IdMap<uint32_t> name_index_;  // the first OpName among them, index plus one
     size_t names_seen_ = 0;
 };
 

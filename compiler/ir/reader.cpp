@@ -112,12 +112,11 @@ class Reader {
         check_operand_count(*info, inst.ops.size());
         check_string(op, inst);
         if (op == Op::OpSwitch) {
-            const auto type = value_types_.find(inst.ops[0]);
-            inst.switch_words = type != value_types_.end() && wide_ints_.count(type->second) ? 2 : 1;
+            inst.switch_words = wide_values_.count(inst.ops[0]) ? 2 : 1;
             if ((inst.ops.size() - 2) % (inst.switch_words + 1u)) malformed("OpSwitch has an incomplete case");
         }
         inst.for_each_id([&](Id id) { check_id(id, info->name); });
-        if (inst.result && inst.type) value_types_[inst.result] = inst.type;
+        if (inst.result && wide_ints_.count(inst.type)) wide_values_.insert(inst.result);
         place(inst);
     }
 
@@ -298,7 +297,7 @@ class Reader {
     bool saw_memory_model_ = false;
     std::vector<bool> defined_;
     std::set<Id> sparse_defined_;
-    std::unordered_map<Id, Id> value_types_;
+    std::set<Id> wide_values_;  // results of 64-bit integer type
     std::set<Id> wide_ints_;
     std::set<Id> dropped_sets_;
     std::set<Id> groups_;

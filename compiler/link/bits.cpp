@@ -19,8 +19,10 @@ constexpr int kMaxDepth = 64;
 }  // namespace
 
 BitAnalysis::BitAnalysis(const ir::Program& program, const std::vector<const ir::Function*>& functions,
-                         const std::map<Id, Bits>& given, bool module_variables)
-    : p_(program) {
+                         const std::map<Id, Bits>& given, bool module_variables, Tables& tables)
+    : p_(program), t_(tables) {
+    ++t_.analysis;
+    ++t_.epoch;
     for (const auto& [id, bits] : given) {
         Cell& fixed = cell(id);
         fixed.bits = bits;
@@ -30,21 +32,25 @@ BitAnalysis::BitAnalysis(const ir::Program& program, const std::vector<const ir:
     settle();
 }
 
-BitAnalysis::Cell& BitAnalysis::cell(Id id) {
-    uint32_t& index = cell_index_[id];
-    if (!index) {
-        cells_.push_back({id, {}, {}, false});
-        index = static_cast<uint32_t>(cells_.size());
+uint32_t BitAnalysis::cell_of(Id id) {
+    Tables::Index& index = t_.cells[id];
+    if (index.analysis != t_.analysis) {
+        index = {static_cast<uint32_t>(cells_.size()), t_.analysis};
+        cells_.push_back({id, 0, 0, {}, false});
     }
-    return cells_[index - 1];
+    return index.cell;
 }
 
 void BitAnalysis::collect(const std::vector<const ir::Function*>& functions, bool module_variables) {
     ir::IdSet open;  // touched by more than whole loads and stores
-    for (const ir::Function* function : functions)
+    std::vector<std::pair<uint32_t, Id>> stored;  // cell, value
+    for (const ir::Function* function : functions) {
         for (const ir::Block& block : function->blocks)
             for (const Inst& inst : block.insts) {
-                if (inst.result) defs_[inst.result] = &inst;
+                if (inst.result) {
+                    t_.defs[inst.result] = {&inst, t_.analysis};
+                    if (mask(inst.type) || inst.op == Op::OpSelect || inst.op == Op::OpPhi) candidates_.push_back(&inst);
+                }
                 switch (inst.op) {
                     case Op::OpLoad: break;
                     case Op::OpStore: {
@@ -54,14 +60,14 @@ void BitAnalysis::collect(const std::vector<const ir::Function*>& functions, boo
                         const auto storage = static_cast<spv::StorageClass>(variable->ops[0]);
                         if (storage == spv::StorageClass::Function ||
                             (storage == spv::StorageClass::Private && module_variables))
-                            cell(inst.ops[0]).values.push_back(inst.ops[1]);
+                            stored.push_back({cell_of(inst.ops[0]), inst.ops[1]});
                         break;
                     }
                     case Op::OpVariable:
                         if (inst.ops.size() > 1 && mask(p_.pointee(inst.type)))
-                            cell(inst.result).values.push_back(inst.ops[1]);
+                            stored.push_back({cell_of(inst.result), inst.ops[1]});
                         break;
-                    case Op::OpReturnValue: cell(function->id()).values.push_back(inst.ops[0]); break;
+                    case Op::OpReturnValue: stored.push_back({cell_of(function->id()), inst.ops[0]}); break;
                     case Op::OpAccessChain:
                     case Op::OpInBoundsAccessChain:
                     case Op::OpCopyObject: open.insert(inst.ops[0]); break;
@@ -79,12 +85,23 @@ void BitAnalysis::collect(const std::vector<const ir::Function*>& functions, boo
                         break;
                 }
             }
+        candidate_ends_.push_back(candidates_.size());
+    }
+    for (const auto& [at, value] : stored) ++cells_[at].count;
+    uint32_t place = 0;
+    for (Cell& one : cells_) {
+        one.first = place;
+        place += one.count;
+        one.count = 0;
+    }
+    values_.resize(place);
+    for (const auto& [at, value] : stored) values_[cells_[at].first + cells_[at].count++] = value;
     for (Cell& one : cells_) {
         if (one.fixed) continue;
         const Inst* variable = def(one.id);
         const bool is_variable = variable && variable->op == Op::OpVariable;
-        const bool global_with_initializer = is_variable && !defs_.get(one.id) && variable->ops.size() > 1;
-        if ((is_variable && open.contains(one.id)) || global_with_initializer || one.values.empty()) {
+        const bool global_with_initializer = is_variable && !local(one.id) && variable->ops.size() > 1;
+        if ((is_variable && open.contains(one.id)) || global_with_initializer || one.count == 0) {
             one.fixed = true;  // of unknown content
             one.bits = {};
         } else {
@@ -99,54 +116,58 @@ void BitAnalysis::settle() {
     bool stable = false;
     for (int round = 0; round < 16 && !stable; ++round) {
         stable = true;
-        ++epoch_;
+        ++t_.epoch;
         std::vector<Bits> next(cells_.size());
         for (size_t i = 0; i < cells_.size(); ++i) {
             next[i] = cells_[i].bits;
             if (cells_[i].fixed) continue;
-            for (Id value : cells_[i].values) {
+            for (uint32_t k = 0; k < cells_[i].count; ++k) {
                 if (!(next[i].zeros | next[i].ones)) break;
-                next[i] = both(next[i], of(value));
+                next[i] = both(next[i], of(values_[cells_[i].first + k]));
             }
             stable &= next[i] == cells_[i].bits;
         }
         for (size_t i = 0; i < cells_.size(); ++i) cells_[i].bits = next[i];
     }
+    bool given_up = false;
     for (Cell& one : cells_)
-        if (!one.fixed && (!stable || (one.bits.zeros & one.bits.ones))) one.bits = {};
-    ++epoch_;
+        if (!one.fixed && (!stable || (one.bits.zeros & one.bits.ones))) {
+            one.bits = {};
+            given_up = true;
+        }
+    // What the last round found out about values stays true when all its cells do.
+    if (given_up) ++t_.epoch;
 }
 
-uint32_t BitAnalysis::mask(Id type) const {
+uint8_t BitAnalysis::look_at(Id type) const {
     const Inst* inst = p_.def(type);
-    if (!inst) return 0;
-    if (inst->op == Op::OpTypeBool) return 1;
-    return inst->op == Op::OpTypeInt && inst->ops[0] == 32 ? 0xffffffffu : 0;
+    const uint8_t kind = !inst                                                  ? 1
+                         : inst->op == Op::OpTypeBool                           ? 2
+                         : inst->op == Op::OpTypeInt && inst->ops[0] == 32u ? 3
+                                                                                : 1;
+    if (inst) t_.masks[type] = kind;
+    return kind;
 }
 
-Bits BitAnalysis::of(Id id) {
-    {
-        const Known known = known_.get(id);
-        if (known.epoch == epoch_) return known.bits;
-    }
+Bits BitAnalysis::find(Id id) {
     if (depth_ >= kMaxDepth) return {};
     const Inst* inst = def(id);
     if (!inst || !inst->type) return {};
     const uint32_t all = mask(inst->type);
-    known_[id] = {{}, epoch_};  // while it is computed, nothing is known: never something wrong
+    t_.known[id] = {{}, t_.epoch};  // while it is computed, nothing is known: never something wrong
     if (!all) return {};
     ++depth_;
     Bits bits = compute(*inst);
     --depth_;
     bits.zeros &= all;
     bits.ones &= all;
-    known_[id] = {bits, epoch_};
+    t_.known[id] = {bits, t_.epoch};
     return bits;
 }
 
 Bits BitAnalysis::content(Id id) const {
-    const uint32_t index = cell_index_.get(id);
-    return index ? cells_[index - 1].bits : Bits{};
+    const Tables::Index index = t_.cells.get(id);
+    return index.analysis == t_.analysis ? cells_[index.cell].bits : Bits{};
 }
 
 Bits BitAnalysis::compute(const Inst& inst) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <map>
+#include <span>
 
 #include "ir/program.h"
 
@@ -23,44 +24,92 @@ Bits both(Bits a, Bits b);  // what holds for either value
 // through, and so are calls; both also where a value depends on itself (flags |= x).
 class BitAnalysis {
   public:
+    // Tables by id. Analyses of one program that come one after the other share them: what one leaves behind,
+    // the next does not see, and none has to clear them.
+    class Tables {
+      public:
+        void reserve(ir::Id bound) {
+            masks.reserve(bound);
+            defs.reserve(bound);
+            cells.reserve(bound);
+            known.reserve(bound);
+        }
+
+      private:
+        friend class BitAnalysis;
+        struct Def {
+            const ir::Inst* inst = nullptr;
+            uint32_t analysis = 0;
+        };
+        struct Known {
+            Bits bits;
+            uint32_t epoch = 0;
+        };
+        struct Index {
+            uint32_t cell = 0, analysis = 0;
+        };
+        ir::IdMap<uint8_t> masks;  // 0: not looked at, 1: none, 2: of a bool, 3: of a 32-bit integer
+        ir::IdMap<Def> defs;
+        ir::IdMap<Index> cells;
+        ir::IdMap<Known> known;
+        uint32_t epoch = 1, analysis = 0;
+    };
+
     // `given`: what loads of these variables give, whatever is stored. `module_variables`: nothing but these
     // functions stores to module-scope variables. Neither the functions nor their instructions may change
     // while the analysis is asked.
     BitAnalysis(const ir::Program& program, const std::vector<const ir::Function*>& functions,
-                const std::map<ir::Id, Bits>& given, bool module_variables);
-    Bits of(ir::Id id);
-    uint32_t mask(ir::Id type) const;  // all bits of the type: 1 for bool, ~0 for 32-bit integers, else 0
+                const std::map<ir::Id, Bits>& given, bool module_variables, Tables& tables);
+    Bits of(ir::Id id) {
+        const Tables::Known& known = t_.known.get(id);
+        return known.epoch == t_.epoch ? known.bits : find(id);
+    }
+    // All bits of the type: 1 for bool, ~0 for 32-bit integers, else 0.
+    uint32_t mask(ir::Id type) const {
+        constexpr uint32_t kMasks[] = {0, 0, 1, ~0u};
+        const uint8_t known = t_.masks.get(type);
+        return kMasks[known ? known : look_at(type)];
+    }
+    // The instructions of a function (by its place among `functions`) whose value may have known bits, or be that
+    // of an operand, in order.
+    std::span<const ir::Inst* const> candidates(size_t function) const {
+        const size_t begin = function ? candidate_ends_[function - 1] : 0;
+        return {candidates_.data() + begin, candidate_ends_[function] - begin};
+    }
     // The instruction that makes a value of the functions or a global one; null for parameters.
     const ir::Inst* def(ir::Id id) const {
-        const ir::Inst* local = defs_.get(id);
-        return local ? local : p_.def(id);
+        const ir::Inst* here = local(id);
+        return here ? here : p_.def(id);
     }
 
   private:
     // A variable or a function's result: one of several values.
     struct Cell {
         ir::Id id = 0;
-        std::vector<ir::Id> values;
+        uint32_t first = 0, count = 0;  // of values_
         Bits bits;
         bool fixed = false;
     };
-    struct Known {
-        Bits bits;
-        uint32_t epoch = 0;
-    };
-    Cell& cell(ir::Id id);
+    const ir::Inst* local(ir::Id id) const {  // null for what is not of the functions
+        const Tables::Def& known = t_.defs.get(id);
+        return known.analysis == t_.analysis ? known.inst : nullptr;
+    }
+    uint8_t look_at(ir::Id type) const;
+    Cell& cell(ir::Id id) { return cells_[cell_of(id)]; }
+    uint32_t cell_of(ir::Id id);
     void collect(const std::vector<const ir::Function*>& functions, bool module_variables);
     void settle();
+    Bits find(ir::Id id);
     Bits compute(const ir::Inst& inst);
     Bits operation(ir::Op op, ir::Id type, const uint32_t* ops, size_t count);
     Bits content(ir::Id id) const;
 
     const ir::Program& p_;
-    ir::IdMap<const ir::Inst*> defs_;
+    Tables& t_;
+    std::vector<const ir::Inst*> candidates_;  // function by function
+    std::vector<size_t> candidate_ends_;
     std::vector<Cell> cells_;
-    ir::IdMap<uint32_t> cell_index_;  // plus one
-    ir::IdMap<Known> known_;
-    uint32_t epoch_ = 1;
+    std::vector<ir::Id> values_;  // what is stored, cell by cell
     int depth_ = 0;
 };
 

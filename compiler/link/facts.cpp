@@ -65,11 +65,12 @@ std::string flag_names(uint32_t bits) {
 
 }  // namespace
 
-void collect_trace_facts(const Program& program, const lower::Stage& stage, TraceFacts& facts) {
+void collect_trace_facts(const Program& program, const lower::Stage& stage, TraceFacts& facts,
+                         BitAnalysis::Tables& tables) {
     std::vector<const ir::Function*> functions{&stage.body};
     for (const ir::Function& function : stage.functions) functions.push_back(&function);
     // Module-scope variables may be payloads, which others write.
-    BitAnalysis bits(program, functions, {}, false);
+    BitAnalysis bits(program, functions, {}, false, tables);
     for (const ir::Block& block : stage.body.blocks)
         for (const Inst& inst : block.insts) {
             if (!lower::is_trace(inst.op)) continue;

@@ -90,9 +90,10 @@ void tidy(Program& p, const std::vector<Id>& roots) {
             need(global->type);
             global->for_each_id(need);
         }
-        for (const Inst* inst : p.decorations_of(id))
-            if (inst->op == Op::OpDecorateId)
-                for (size_t i = 2; i < inst->ops.size(); ++i) need(inst->ops[i]);
+        p.for_each_decoration(id, [&](const Inst& inst) {
+            if (inst.op == Op::OpDecorateId)
+                for (size_t i = 2; i < inst.ops.size(); ++i) need(inst.ops[i]);
+        });
     }
     // The WorkgroupSize constant is used by its decoration alone.
     for (const Inst& inst : m.decorations)
@@ -120,19 +121,20 @@ void tidy(Program& p, const std::vector<Id>& roots) {
             ordered.push_back(inst);
         }
     ir::IdSet placed;
-    std::function<void(Id)> place = [&](Id id) {
+    ordered.reserve(m.globals.size());
+    auto place = [&](auto& self, Id id) -> void {
         const Inst* inst = p.def(id);
         if (!inst || !placed.insert(id)) return;
-        if (inst->type) place(inst->type);
+        if (inst->type) self(self, inst->type);
         inst->for_each_id([&](Id operand) {
             if (inst->op == Op::OpTypeStruct && forward.count(operand)) return;
-            place(operand);
+            self(self, operand);
         });
         ordered.push_back(*inst);
     };
     for (const Inst& inst : m.globals)
-        if (inst.result && live.count(inst.result)) place(inst.result);
-    for (Id id : forward) place(id);
+        if (inst.result && live.count(inst.result)) place(place, inst.result);
+    for (Id id : forward) place(place, id);
     m.globals = std::move(ordered);
 
     // Ids by first appearance: the same module whatever the passes allocated on the way.

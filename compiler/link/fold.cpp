@@ -19,33 +19,49 @@ using ir::Function;
 // What values become: constants, or other values they always equal.
 class Values {
   public:
-    Values(Program& program, const std::vector<Function*>& functions, const std::map<Id, Bits>& given)
-        : p_(program), functions_(functions), bits_(program, {functions.begin(), functions.end()}, given, true) {}
+    Values(Program& program, const std::vector<Function*>& functions, const std::map<Id, Bits>& given,
+           BitAnalysis::Tables& tables)
+        : p_(program), functions_(functions), bits_(program, {functions.begin(), functions.end()}, given, true, tables) {}
 
     void replace() {
         // All is decided before the first instruction moves.
+        bool everywhere = false;
         for (size_t i = 0; i < p_.module.globals.size(); ++i) {
             const Inst& inst = p_.module.globals[i];
-            if (inst.op == Op::OpSpecConstantOp) decide(Id(inst.result), Id(inst.type));
+            if (inst.op == Op::OpSpecConstantOp) everywhere |= decide(Id(inst.result), Id(inst.type));
         }
         for (const Function* function : functions_)
             for (const Inst& inst : function->params) params_.insert(inst.result);
-        for (const Function* function : functions_)
-            for (const Block& block : function->blocks)
-                for (const Inst& inst : block.insts) {
-                    if (!inst.result || inst.op == Op::OpVariable || decide(inst.result, inst.type)) continue;
-                    const Id same = same_as(inst);
-                    if (same && !params_.contains(same) && bits_.def(same) && bits_.def(same)->type == inst.type)
-                        become_[inst.result] = same;
+        std::vector<bool> changes(functions_.size(), everywhere);
+        for (size_t i = 0; i < functions_.size(); ++i)
+            for (const Inst* inst : bits_.candidates(i)) {
+                if (decide(inst->result, inst->type)) {
+                    changes[i] = true;
+                    continue;
                 }
-        for (Function* function : functions_)
-            for (Block& block : function->blocks) {
-                for (Inst& inst : block.insts) inst.for_each_id([&](Id& id) { id = resolve(id); });
-                // A call may do more than give its value.
-                std::erase_if(block.insts, [&](const Inst& inst) {
-                    return inst.result && inst.op != Op::OpFunctionCall && become_.get(inst.result);
-                });
+                const Id same = same_as(*inst);
+                if (same && !params_.contains(same) && bits_.def(same) && bits_.def(same)->type == inst->type) {
+                    become_[inst->result] = same;
+                    changes[i] = true;
+                }
             }
+        for (size_t i = 0; i < functions_.size(); ++i) {
+            if (!changes[i]) continue;
+            for (Block& block : functions_[i]->blocks) {
+                bool goes = false;
+                for (Inst& inst : block.insts) {
+                    inst.for_each_id([&](Id& id) {
+                        if (become_.get(id)) id = resolve(id);
+                    });
+                    goes |= inst.result && become_.get(inst.result);
+                }
+                // A call may do more than give its value.
+                if (goes)
+                    std::erase_if(block.insts, [&](const Inst& inst) {
+                        return inst.result && inst.op != Op::OpFunctionCall && become_.get(inst.result);
+                    });
+            }
+        }
     }
 
   private:
@@ -117,7 +133,7 @@ class Branches {
   private:
     bool fold_branches() {
         bool changed = false;
-        std::set<Id> headers;  // of the loops so far: a branch to one of them is its back edge
+        ir::IdSet headers;  // of the loops so far: a branch to one of them is its back edge
         for (Block& block : f_.blocks) {
             if (const Inst* merge = block.merge(); merge && merge->op == Op::OpLoopMerge) headers.insert(block.label);
             Inst& end = block.terminator();
@@ -148,7 +164,7 @@ class Branches {
             work.pop_back();
             if (!reachable.insert(label)) continue;
             const Block& block = *blocks.get(label);
-            for (Id next : block.successors()) work.push_back(next);
+            block.for_each_successor([&](Id next) { work.push_back(next); });
             if (const Inst* merge = block.merge()) {
                 merges[merge->ops[0]] = label;
                 if (merge->op == Op::OpLoopMerge) continues[merge->ops[1]] = label;
@@ -170,8 +186,9 @@ class Branches {
             if (!block.insts.empty() && block.insts.front().op == Op::OpPhi) sources[block.label];
         if (sources.empty()) return;
         for (const Block& block : f_.blocks)
-            for (Id next : block.successors())
+            block.for_each_successor([&](Id next) {
                 if (const auto found = sources.find(next); found != sources.end()) found->second.insert(block.label);
+            });
         for (Block& block : f_.blocks)
             for (Inst& inst : block.insts) {
                 if (inst.op != Op::OpPhi) continue;
@@ -191,7 +208,7 @@ class Branches {
         for (size_t i = 0; i < f_.blocks.size(); ++i) {
             const Block& block = f_.blocks[i];
             index[block.label] = static_cast<uint32_t>(i);
-            for (Id next : block.successors()) ++arrivals[next];
+            block.for_each_successor([&](Id next) { ++arrivals[next]; });
             if (const Inst* merge = block.merge()) {
                 named.insert(merge->ops[0]);
                 if (merge->op == Op::OpLoopMerge) named.insert(merge->ops[1]);
@@ -274,18 +291,22 @@ class Liveness {
     // `functions`: callees first.
     Liveness(Program& program, std::vector<Function*> functions, Id save, Id scratch_store)
         : p_(program), save_(save), store_(scratch_store), order_(std::move(functions)) {
-        for (Function* function : order_)
-            for (const Block& block : function->blocks)
-                for (const Inst& inst : block.insts)
-                    if (inst.result) defs_[inst.result] = &inst;
-        store_count_ = 0;
+        for (ir::IdSet* set : {&pure_, &read_, &live_}) set->reserve(p_.module.bound);
+        defs_.reserve(p_.module.bound);
+        writer_heads_.reserve(p_.module.bound);
     }
 
     void run() {
-        find_pure();
-        for (Function* function : order_)
+        for (Function* function : order_) {
+            // What a pointer is made of stands before it.
+            bool pure = true;
             for (const Block& block : function->blocks)
-                for (const Inst& inst : block.insts) start(*function, inst);
+                for (const Inst& inst : block.insts) {
+                    if (inst.result) defs_[inst.result] = &inst;
+                    pure = start(*function, inst) && pure;
+                }
+            if (pure) pure_.insert(function->id());
+        }
         while (!work_.empty()) {
             const Inst* inst = work_.back();
             work_.pop_back();
@@ -322,23 +343,6 @@ class Liveness {
 
     bool is_local(Id variable) const { return variable && !p_.def(variable); }
 
-    void find_pure() {
-        for (Function* function : order_) {
-            bool pure = true;
-            for (const Block& block : function->blocks)
-                for (const Inst& inst : block.insts) {
-                    if (inst.op == Op::OpStore)
-                        pure &= is_local(own_variable(inst.ops[0]));
-                    else if (inst.op == Op::OpFunctionCall)
-                        pure &= pure_.count(inst.ops[0]) != 0;
-                    else
-                        pure &= is_plain(inst) || inst.is_merge() ||
-                                (inst.is_terminator() && inst.op != Op::OpKill && inst.op != Op::OpTerminateInvocation);
-                }
-            if (pure) pure_.insert(function->id());
-        }
-    }
-
     // Variables whose loads a value is made of.
     void sources(Id value, std::set<Id>& out, int depth = 0) const {
         const Inst* local = defs_.get(value);
@@ -354,7 +358,8 @@ class Liveness {
         local->for_each_id([&](Id id) { sources(id, out, depth + 1); });
     }
 
-    void start(const Function& function, const Inst& inst) {
+    // Takes in an instruction; true when all it does is give a value, or write a variable of its function.
+    bool start(const Function& function, const Inst& inst) {
         if (inst.op == Op::OpStore) {
             const Id variable = own_variable(inst.ops[0]);
             const uint32_t number = store_count_++;
@@ -362,35 +367,40 @@ class Liveness {
             if (!variable)
                 mark({&inst, number});
             else
-                writers_of(variable).push_back({&inst, number});
-        } else if (inst.op == Op::OpFunctionCall) {
+                add_writer(variable, {&inst, number});
+            return is_local(variable);
+        }
+        if (inst.op == Op::OpFunctionCall) {
+            const bool pure = pure_.contains(inst.ops[0]);
             if (function.id() == save_ && inst.ops[0] == store_) {
                 // A word of a waiting ray is kept only for those who read it.
                 std::set<Id> variables;
                 sources(inst.ops[2], variables);
                 if (!variables.empty() && !variables.count(0)) {
-                    for (Id variable : variables) writers_of(variable).push_back({&inst, 0});
-                    return;
+                    for (Id variable : variables) add_writer(variable, {&inst, 0});
+                    return pure;
                 }
             }
-            if (!pure_.count(inst.ops[0])) mark({&inst, 0});
-        } else if (!is_plain(inst)) {
-            mark({&inst, 0});
+            if (!pure) mark({&inst, 0});
+            return pure;
         }
+        if (is_plain(inst)) return true;
+        mark({&inst, 0});
+        return inst.is_merge() ||
+               (inst.is_terminator() && inst.op != Op::OpKill && inst.op != Op::OpTerminateInvocation);
     }
 
     // What has a result is known by it, stores by their number; everything else stays.
     struct Writer {
         const Inst* inst = nullptr;
         uint32_t number = 0;
+        uint32_t next = 0;  // writer of the same variable, plus one
     };
-    std::vector<Writer>& writers_of(Id variable) {
-        uint32_t& index = writer_index_[variable];
-        if (!index) {
-            writers_.emplace_back();
-            index = static_cast<uint32_t>(writers_.size());
-        }
-        return writers_[index - 1];
+    void add_writer(Id variable, Writer writer) {
+        uint32_t& head = writer_heads_[variable];
+        writer.next = head;
+        writers_.push_back(writer);
+        head = static_cast<uint32_t>(writers_.size());
     }
 
     void mark(Writer writer) {
@@ -405,8 +415,7 @@ class Liveness {
 
     void read(Id variable) {
         if (!variable || !read_.insert(variable)) return;
-        if (const uint32_t index = writer_index_.get(variable))
-            for (const Writer& writer : writers_[index - 1]) mark(writer);
+        for (uint32_t at = writer_heads_.get(variable); at; at = writers_[at - 1].next) mark(writers_[at - 1]);
     }
 
     void follow(const Inst& inst) {
@@ -426,29 +435,56 @@ class Liveness {
     std::vector<Function*> order_;
     ir::IdMap<const Inst*> defs_;
     ir::IdSet pure_, read_, live_;
-    std::vector<std::vector<Writer>> writers_;  // by variable
-    ir::IdMap<uint32_t> writer_index_;          // plus one
+    std::vector<Writer> writers_;
+    ir::IdMap<uint32_t> writer_heads_;  // by variable: its last writer, plus one
     std::vector<bool> live_stores_;
     uint32_t store_count_ = 0;
     std::vector<const Inst*> work_;
 };
 
-std::vector<Function*> reachable(Program& program, Id main) {
-    std::unordered_map<Id, Function*> functions;
-    for (Function& function : program.module.functions) functions[function.id()] = &function;
-    std::set<Id> seen;
-    std::vector<Function*> out;  // callees first
-    std::function<void(Id)> visit = [&](Id id) {
-        const auto found = functions.find(id);
-        if (found == functions.end() || !seen.insert(id).second) return;
-        for (const Block& block : found->second->blocks)
-            for (const Inst& inst : block.insts)
-                if (inst.op == Op::OpFunctionCall) visit(inst.ops[0]);
-        out.push_back(found->second);
+// The functions `main` reaches; what each calls is kept until it changes.
+class CallGraph {
+  public:
+    CallGraph(Program& program, Id main) : main_(main) {
+        for (Function& function : program.module.functions) {
+            nodes_.push_back({&function, false, {}});
+            index_[function.id()] = static_cast<uint32_t>(nodes_.size());
+        }
+    }
+
+    std::vector<Function*> reachable() {  // callees first
+        std::vector<bool> seen(nodes_.size(), false);
+        std::vector<Function*> out;
+        auto visit = [&](auto& self, Id id) -> void {
+            const uint32_t at = index_.get(id);
+            if (!at || seen[at - 1]) return;
+            seen[at - 1] = true;
+            Node& node = nodes_[at - 1];
+            if (!node.known) {
+                node.calls.clear();
+                for (const Block& block : node.function->blocks)
+                    for (const Inst& inst : block.insts)
+                        if (inst.op == Op::OpFunctionCall) node.calls.push_back(inst.ops[0]);
+                node.known = true;
+            }
+            for (Id callee : node.calls) self(self, callee);
+            out.push_back(node.function);
+        };
+        visit(visit, main_);
+        return out;
+    }
+    void changed(const Function& function) { nodes_[index_.get(function.id()) - 1].known = false; }
+
+  private:
+    struct Node {
+        Function* function;
+        bool known;
+        std::vector<Id> calls;
     };
-    visit(main);
-    return out;
-}
+    Id main_;
+    std::vector<Node> nodes_;
+    ir::IdMap<uint32_t> index_;  // in nodes_, plus one
+};
 
 }  // namespace
 
@@ -457,24 +493,31 @@ void fold(Program& program, Id main, const std::map<Id, Bits>& given) {
     std::set<Id> constant;
     for (const auto& [variable, bits] : given)
         if (bits.constant(0xffffffffu)) constant.insert(variable);
+    CallGraph graph(program, main);
+    BitAnalysis::Tables tables;
+    tables.reserve(program.module.bound);
     for (int round = 0; round < 3; ++round) {
-        const std::vector<Function*> functions = reachable(program, main);
+        const std::vector<Function*> functions = graph.reachable();
         if (round == 0 && !constant.empty())
             for (Function* function : functions)
                 for (Block& block : function->blocks)
                     std::erase_if(block.insts, [&](const Inst& inst) {
                         return inst.op == Op::OpStore && constant.count(inst.ops[0]) != 0;
                     });
-        Values(program, functions, given).replace();
+        Values(program, functions, given, tables).replace();
         // Stores in branches that turn out dead say nothing about their variables: once more.
         bool folded = false;
-        for (Function* function : functions) folded |= Branches(program, *function).fold();
+        for (Function* function : functions)
+            if (Branches(program, *function).fold()) {
+                graph.changed(*function);
+                folded = true;
+            }
         if (!folded) break;
     }
 }
 
 void remove_dead(Program& program, Id main, Id save, Id scratch_store) {
-    Liveness(program, reachable(program, main), save, scratch_store).run();
+    Liveness(program, CallGraph(program, main).reachable(), save, scratch_store).run();
 }
 
 }  // namespace rtc::link

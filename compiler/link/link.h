@@ -29,8 +29,9 @@ struct TraceFacts {
     uint32_t sites = 0;
     Bits flags, mask, offset, stride, miss;  // certain at every trace site
 };
-// Adds a stage's trace sites. The stage is in memory form.
-void collect_trace_facts(const Program& program, const lower::Stage& stage, TraceFacts& facts);
+// Adds a stage's trace sites. The stage is in memory form. `tables`: one for all stages.
+void collect_trace_facts(const Program& program, const lower::Stage& stage, TraceFacts& facts,
+                         BitAnalysis::Tables& tables);
 
 // What of the traversal a pipeline needs.
 struct Needs {
@@ -86,7 +87,7 @@ bool optimize(std::vector<uint32_t>& spirv, Optimization level, std::string& mes
 
 // partial.cpp: a finished module with stubs in place of its traversal functions, and back: `changed` is what
 // a tool that keeps ids made of the former.
-ir::Module without_traversal(const ir::Module& module);
+ir::Module without_traversal(ir::Module& module);
 ir::Module with_traversal(ir::Module changed, const ir::Module& original);
 
 }  // namespace rtc::link

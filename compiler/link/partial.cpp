@@ -6,24 +6,35 @@
 
 namespace rtc::link {
 
-ir::Module without_traversal(const ir::Module& module) {
+ir::Module without_traversal(ir::Module& module) {
+    // Bodies that are not there any more need no copy.
+    std::vector<ir::Function> functions;
+    functions.swap(module.functions);
     ir::Module out = module;
-    for (ir::Function& function : out.functions) {
-        if (!function.prepared) continue;
+    functions.swap(module.functions);
+    Id void_type = 0;
+    for (const Inst& inst : out.globals)
+        if (inst.op == Op::OpTypeVoid) void_type = inst.result;
+    for (const ir::Function& whole : module.functions) {
+        if (!whole.prepared) {
+            out.functions.push_back(whole);
+            continue;
+        }
+        ir::Function function;
+        function.def = whole.def;
+        function.params = whole.params;
+        function.prepared = true;
         ir::Block block;
-        block.label = function.blocks.front().label;
-        Op result = Op::OpNop;
-        for (const Inst& inst : out.globals)
-            if (inst.result == function.def.type) result = inst.op;
-        if (result == Op::OpTypeVoid) {
+        block.label = whole.blocks.front().label;
+        if (function.def.type == void_type) {
             block.insts.push_back(Inst(Op::OpReturn, 0, 0, {}));
         } else {
             const Id value = out.new_id();
             block.insts.push_back(Inst(Op::OpUndef, function.def.type, value, {}));
             block.insts.push_back(Inst(Op::OpReturnValue, 0, 0, {value}));
         }
-        function.blocks.clear();
         function.blocks.push_back(std::move(block));
+        out.functions.push_back(std::move(function));
     }
     // Decorations and names of code that is not there.
     ir::IdSet there;

@@ -199,7 +199,7 @@ class Linker {
         // Last before the split: earlier passes may still move values between blocks.
         lower::to_memory_form(program_, stage, kinds_);
         if (machine_.resumable) lower::count_loops(program_, stage, machine_);
-        link::collect_trace_facts(program_, stage, trace_facts_);
+        link::collect_trace_facts(program_, stage, trace_facts_, bit_tables_);
 
         StageReport report;
         report.kind = stage.kind;
@@ -280,7 +280,7 @@ class Linker {
             {"rtc_hit_kind", "gl_HitKind"},         {"rtc_hit_primitive", "gl_PrimitiveID"},
             {"rtc_hit_geometry", "gl_GeometryIndex"}, {"rtc_hit_attr0", "hit attributes"},
         };
-        std::set<Id> read;
+        ir::IdSet read;
         for (const ir::Function& function : program_.module.functions)
             for (const ir::Block& block : function.blocks)
                 for (const Inst& inst : block.insts)
@@ -437,6 +437,7 @@ class Linker {
     std::vector<ir::Module> modules_;
     link::ResourceTable resources_;
     link::TraceFacts trace_facts_;
+    link::BitAnalysis::Tables bit_tables_;
     std::set<StageKind> removed_kinds_;
     bool nested_ = false;
     std::vector<ir::Function> helpers_;

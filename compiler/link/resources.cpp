@@ -108,7 +108,7 @@ void unify_resources(Program& p, lower::Stage& stage, ResourceTable& table, Refl
                     if (!p.decoration(variable, spv::Decoration::Aliased))
                         p.decorate(variable, spv::Decoration::Aliased);
             ResourceReport report;
-            report.name = p.module.name_of(id);
+            report.name = p.name_of(id);
             report.stage = stage.name;
             report.set = set;
             report.binding = binding;

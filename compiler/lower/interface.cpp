@@ -362,7 +362,7 @@ class Interface {
 
     // The variable's uses become uses of a Private variable set on entry.
     void snapshot(Id id, Id type, const std::function<Id()>& value) {
-        const Id variable = p_.add_variable(StorageClass::Private, type, p_.module.name_of(id));
+        const Id variable = p_.add_variable(StorageClass::Private, type, p_.name_of(id));
         e_.store(variable, value());
         replace_id(id, variable);
         private_bases_.insert(variable);
