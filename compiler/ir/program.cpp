@@ -327,6 +327,8 @@ void Program::reindex() {
 }
 
 std::vector<Function> Program::import(const Module& source, IdMap<Id>& map) {
+    // (A damaged bound may be far beyond the ids there are.)
+    map.reserve(std::min<Id>(source.bound, 1u << 16));
     auto mapped = [&](Id id) {
         Id& known = map[id];
         if (!known) known = module.new_id();

@@ -31,7 +31,14 @@ class Words {
     Words(It first, It last) {
         assign(first, last);
     }
-    Words(const Words& other) { assign(other.begin(), other.end()); }
+    Words(const Words& other) {
+        if (other.is_inline()) {
+            size_ = other.size_;
+            std::memcpy(inline_, other.inline_, sizeof inline_);
+        } else {
+            assign(other.begin(), other.end());
+        }
+    }
     Words(Words&& other) noexcept { take(other); }
     ~Words() { release(); }
 

@@ -13,6 +13,39 @@ namespace {
 
 Bits truth(bool value) { return value ? Bits{0, 1} : Bits{1, 0}; }
 
+// Whether anything can be said about results of this operation (BitAnalysis::compute).
+bool can_be_known(Op op) {
+    switch (op) {
+        case Op::OpLoad:
+        case Op::OpFunctionCall:
+        case Op::OpPhi:
+        case Op::OpCopyObject:
+        case Op::OpBitcast:
+        case Op::OpBitwiseAnd:
+        case Op::OpLogicalAnd:
+        case Op::OpBitwiseOr:
+        case Op::OpLogicalOr:
+        case Op::OpBitwiseXor:
+        case Op::OpLogicalNotEqual:
+        case Op::OpLogicalEqual:
+        case Op::OpNot:
+        case Op::OpLogicalNot:
+        case Op::OpIEqual:
+        case Op::OpINotEqual:
+        case Op::OpSelect:
+        case Op::OpShiftLeftLogical:
+        case Op::OpShiftRightLogical:
+        case Op::OpIAdd:
+        case Op::OpISub:
+        case Op::OpIMul:
+        case Op::OpULessThan:
+        case Op::OpUGreaterThan:
+        case Op::OpULessThanEqual:
+        case Op::OpUGreaterThanEqual: return true;
+        default: return false;
+    }
+}
+
 // Deeper chains are rare, and nothing is lost but knowledge.
 constexpr int kMaxDepth = 64;
 
@@ -49,7 +82,8 @@ void BitAnalysis::collect(const std::vector<const ir::Function*>& functions, boo
             for (const Inst& inst : block.insts) {
                 if (inst.result) {
                     t_.defs[inst.result] = {&inst, t_.analysis};
-                    if (mask(inst.type) || inst.op == Op::OpSelect || inst.op == Op::OpPhi) candidates_.push_back(&inst);
+                    if (can_be_known(inst.op) && (mask(inst.type) || inst.op == Op::OpSelect || inst.op == Op::OpPhi))
+                        candidates_.push_back(&inst);
                 }
                 switch (inst.op) {
                     case Op::OpLoad: break;
@@ -171,6 +205,7 @@ Bits BitAnalysis::content(Id id) const {
 }
 
 Bits BitAnalysis::compute(const Inst& inst) {
+    // (An operation that is added here goes into can_be_known too.)
     switch (inst.op) {
         case Op::OpConstantTrue: return truth(true);
         case Op::OpConstantFalse: return truth(false);

@@ -62,6 +62,7 @@ void place_reserved(Program& p, continuation::Machine& machine, const LinkOption
 void tidy(Program& p, const std::vector<Id>& roots) {
     ir::Module& m = p.module;
     ir::IdSet live;
+    live.reserve(m.bound);
     std::vector<Id> work(roots);
     ir::IdMap<uint32_t> functions;  // index plus one
     for (size_t i = 0; i < m.functions.size(); ++i) functions[m.functions[i].id()] = static_cast<uint32_t>(i + 1);
@@ -139,6 +140,7 @@ void tidy(Program& p, const std::vector<Id>& roots) {
 
     // Ids by first appearance: the same module whatever the passes allocated on the way.
     ir::IdMap<Id> numbers;
+    numbers.reserve(m.bound);
     Id next = 1;
     auto number = [&](Id& id) {
         if (!id) return;
