@@ -25,9 +25,13 @@ Host::Host(std::set<Backend> backends, const Options& options) {
 RunResult Host::run(Backend backend, const Job& job, const RtcOptions& options, unsigned repeats) {
     std::unique_ptr<native::Executor> executor;
     switch (backend) {
-        case Backend::Rtc:
-            executor = make_rtc(*rtc_, options);
+        case Backend::Rtc: {
+            RtcOptions chosen = options;
+            if (!job.addressing.empty()) chosen.addressing = tools::addressing_from_name(job.addressing);
+            chosen.assume = job.assume;
+            executor = make_rtc(*rtc_, chosen);
             break;
+        }
         case Backend::Khr:
             executor = native::make_khr(*context_);
             break;

@@ -59,7 +59,8 @@ Job parse_case(const Json& json, const std::string& file) {
     static const std::set<std::string> known = {
         "name", "section", "stages",         "groups",       "table",   "scene",
         "size", "push",    "bindings",       "expect",       "spec",    "recursion",
-        "only", "skip",    "callable-depth", "launch-error", "include", "about"};
+        "only", "skip",    "callable-depth", "launch-error", "include", "about",
+        "addressing", "assume"};
     if (!json.is_object()) throw Error(file + ": a case is a JSON object");
     for (const auto& [key, value] : json.items())
         if (!known.count(key)) throw Error(file + ": unknown key '" + key + "' in a case");
@@ -116,6 +117,8 @@ Job parse_case(const Json& json, const std::string& file) {
     job.recursion = json.value("recursion", 0u);
     job.callable_depth = json.value("callable-depth", 0u);
     job.launch_error = text_or(json, "launch-error", "");
+    job.addressing = text_or(json, "addressing", "");
+    job.assume = text_or(json, "assume", "");
     for (const Json& item : json.value("only", Json::array())) job.only.insert(item.get<std::string>());
     const Json skips = json.value("skip", Json::object());
     for (const auto& [backend, reason] : skips.items()) job.skip[backend] = reason.get<std::string>();

@@ -55,6 +55,8 @@ struct Job {
     uint32_t recursion = 0, callable_depth = 0;  // 0: from the shaders
     std::vector<Expectation> expectations;
     std::string launch_error;                 // expected on rtc, "" for none
+    std::string addressing;                   // "heap" or "address" where rtc must link for that one, else ""
+    std::string assume;                       // promises about the scene, as rtc --assume takes them
     std::set<std::string> only;               // dialects or backends a case is limited to; empty: all
     std::map<std::string, std::string> skip;  // backend -> reason
 

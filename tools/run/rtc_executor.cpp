@@ -206,6 +206,14 @@ class RtcExecutor final : public Executor {
         std::memcpy(table_buffer_.mapped, table_.bytes.data(), table_.bytes.size());
     }
 
+    // A module of heap mode could do nothing with it.
+    VkDeviceAddress top_address(uint32_t top) const override {
+        uint64_t handle = 0;
+        if (addresses_ && rtrGetAccelerationStructureHandle(device_, tops_.at(top), sizeof handle, &handle) != VK_SUCCESS)
+            throw Error("rtrGetAccelerationStructureHandle failed: " + said_);
+        return handle;
+    }
+
     void write_top(VkDescriptorSet set, uint32_t binding, uint32_t element, uint32_t top) override {
         VkDescriptorBufferInfo info{};
         if (top == ~0u && addresses_)
@@ -343,6 +351,8 @@ class RtcExecutor final : public Executor {
             options, options_.optimize ? RTCC_OPTIMIZATION_PERFORMANCE : RTCC_OPTIMIZATION_NONE);
         bool needed = rtrGetDeviceSupport(device_)->needsResumableModules;
         rtcc_options_set_addressing(options, addresses_ ? RTCC_ADDRESSING_ADDRESS : RTCC_ADDRESSING_HEAP);
+        if (rtcc_options_assume(options, options_.assume.c_str()) != RTCC_STATUS_SUCCESS)
+            throw Error("no such assumption: " + options_.assume);
         rtcc_options_set_resumable(options, options_.resumable < 0 ? needed : options_.resumable);
         for (const tools::JobShader& shader : job.shaders) {
             int32_t stage = rtcc_pipeline_add_spirv(pipeline, stage_of(shader.stage), shader.name.c_str(),

@@ -67,3 +67,41 @@ case("resources/scenes-that-share-meshes", {
      scene={"meshes": [{"name": "t", "triangles": [triangle(1)]}],
             "tops": {"a": [{"mesh": "t", "custom": 5}],
                      "b": [{"mesh": "t", "custom": 7, "mask": 0}, {"mesh": "t", "custom": 6, "transform": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 2]}]}})
+
+# Acceleration structures made of device addresses, which address mode alone has.
+EXT_IN = to_ext(IN)
+ADDRESSES = {"0.2": [{"address": "0.0"}, {"u64": 0}]}
+ADDRESSED = "layout(set = 0, binding = 2) readonly buffer Addresses { ADDRESS of[2]; };\n"
+
+
+def addressed(name, look, expects, address="uint64_t", extension="GL_EXT_shader_explicit_arithmetic_types_int64", rchit=None,
+              rmiss=None, scene=ONE_TRIANGLE, **more):
+    """rgen: the scene's descriptor is read too, or no binding would tell its address."""
+    head = ADDRESSED.replace("ADDRESS", address)
+    case(f"resources/{name}", {
+        # (A macro: glslang 12 hands such a value to a function by a pointer it is not.)
+        "rgen": ext(head + to_ext(P) + "#define LOOK(s) p = 0u; traceRayEXT(s, 0, 0xff, 0, 0, 0, " + RAY + ", 0)\n"
+                    "void main() {\n    LOOK(scene);\n    r[0] = p;\n    LOOK(" + look + ");\n    r[1] = p;\n}\n", extensions=(extension,)),
+        "rchit": rchit or ext(EXT_IN + "void main() { p = 1u + uint(gl_HitTEXT); }\n", scene=False),
+        "rmiss": rmiss or to_ext(MISS)}, expects, section="GLSL_EXT_ray_tracing, acceleration structures from addresses",
+         scene=scene, bindings=ADDRESSES, addressing="address", **more)
+
+
+LOOKS = "accelerationStructureEXT(of[0])"
+addressed("scene-of-a-64-bit-address", LOOKS, [expect("a scene by descriptor", 0, [5]), expect("accelerationStructureEXT(uint64_t)", 1, [5])])
+addressed("scene-of-two-32-bit-words", LOOKS, [expect("accelerationStructureEXT(uvec2)", 1, [5])], address="uvec2",
+          extension="GL_EXT_ray_tracing")
+addressed("scene-of-address-0", "accelerationStructureEXT(of[1])", [expect("address 0 is the null structure", 1, [9])])
+addressed("scene-of-an-address-in-closest-hit", LOOKS, [expect("a closest-hit traces by address", 1, [105])], recursion=2,
+          rchit=ext(ADDRESSED.replace("ADDRESS", "uint64_t") + EXT_IN + "layout(location = 1) rayPayloadEXT uint q;\n" + f"""void main() {{
+    if (p == 77u) {{ p = 1u + uint(gl_HitTEXT); return; }}
+    q = 77u;
+    traceRayEXT(accelerationStructureEXT(of[0]), 0, 0xff, 0, 0, 0, {RAY}, 1);
+    p = q + 25u * uint(gl_HitTEXT);
+}}
+""", scene=False, extensions=("GL_EXT_shader_explicit_arithmetic_types_int64",)))
+addressed("scene-of-an-address-as-assumed", LOOKS, [expect("by descriptor, under assumptions", 0, [5]), expect("by address, under assumptions", 1, [5])],
+          assume="opaque,triangles,no-masks,identity-transforms,no-instance-flags", 
+          scene={"meshes": [{"name": "t", "triangles": [triangle(1)], "geometry-flags": ["opaque"]}]})
+addressed("scene-of-an-address-not-as-assumed", LOOKS, [], assume="triangles", launch_error="assumption", only=["rtc"],
+          scene={"meshes": [{"name": "b", "boxes": [box(0, 0, 1, 2)]}]})
