@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <tuple>
 
 #include "cases.h"
 #include "progress.h"
@@ -52,7 +53,7 @@ CampaignPush push_of(const CampaignPoint& point, uint32_t mode, uint32_t seed) {
     return push;
 }
 
-CampaignOffender judged(const CampaignCounters::Offender& found, const CampaignPush& push,
+CampaignOffender judged(const CampaignCounters::Offender& found, const CampaignPush& push, CampaignProgram program,
                         const std::vector<Triangle>& triangles, const Transform& world_to_object) {
     CampaignOffender o;
     o.number = uint64_t(found.high) << 32 | found.low;
@@ -60,6 +61,7 @@ CampaignOffender judged(const CampaignCounters::Offender& found, const CampaignP
     o.direction = {found.direction[0], found.direction[1], found.direction[2]};
     o.front = found.front;
     o.back = found.back;
+    if (program == CampaignProgram::Spawn) return o;
     const CampaignRay again = campaign_ray(push, triangles, o.number);
     o.closest = again.closest;
     o.same_ray = std::memcmp(&again.origin, &o.origin, sizeof(Vec3)) == 0 &&
@@ -69,47 +71,73 @@ CampaignOffender judged(const CampaignCounters::Offender& found, const CampaignP
     return o;
 }
 
-}  // namespace
+// Places of one mesh after another; shapes that are the same are shared.
+class PointList {
+  public:
+    explicit PointList(const Shape& shape, std::vector<CampaignPoint>& points, uint32_t& corners)
+        : shape_(shape), points_(points), corners_(corners), here_(share({0, 0, 0})) {}
 
-std::vector<CampaignPoint> campaign_points(bool beyond) {
+    void add(const std::string& name, const Transform& transform, double offset, bool vertices, bool promised) {
+        const double at = offset * shape_.size;
+        const std::array<double, 3> where = {at, -at, at / 2};
+        if (vertices && offset != there_offset_) {
+            there_ = offset == 0 ? here_ : share(where);
+            there_offset_ = offset;
+        }
+        CampaignPoint point;
+        point.mesh = shape_.mesh.name;
+        point.transform = name;
+        point.place = vertices ? "vertices" : "instance";
+        point.offset = offset;
+        point.promised = promised;
+        std::tie(point.shape, point.first_corner) = vertices ? there_ : here_;
+        point.object_to_world = transform;
+        if (!vertices) point.object_to_world = translated(transform, float(where[0]), float(where[1]), float(where[2]));
+        for (int i = 0; i < 3; ++i) point.ball[i] = vertices ? float(where[i]) : 0;
+        // Origins keep their distance where floats are coarser than the mesh.
+        point.ball[3] = float(std::max(3 * shape_.size, std::ldexp(at, -18)));
+        point.convex = shape_.convex && at < 5e6;
+        points_.push_back(std::move(point));
+    }
+
+  private:
+    using Shared = std::pair<std::shared_ptr<const IndexedMesh>, uint32_t>;
+    Shared share(const std::array<double, 3>& where) {
+        const uint32_t first = corners_;
+        corners_ += uint32_t(shape_.mesh.triangles.size() * 9);
+        return {std::make_shared<const IndexedMesh>(moved(shape_.mesh, 1, where)), first};
+    }
+
+    const Shape& shape_;
+    std::vector<CampaignPoint>& points_;
+    uint32_t& corners_;
+    Shared here_, there_;
+    double there_offset_ = -1;
+};
+
+std::vector<CampaignPoint> make_points(bool beyond, bool more_transforms) {
     std::vector<CampaignPoint> points;
     uint32_t corners = 0;
     for (const Shape& shape : shapes()) {
-        const auto here = std::make_shared<const IndexedMesh>(shape.mesh);
-        const uint32_t floats = uint32_t(shape.mesh.triangles.size() * 9), here_corner = corners;
-        corners += floats;
+        PointList list(shape, points, corners);
         for (int exponent = beyond ? 5 : 0; exponent <= (beyond ? 8 : 4); ++exponent) {
-            const double at = exponent == 0 ? 0 : std::pow(10.0, exponent) * shape.size;
-            const std::array<double, 3> offset = {at, -at, at / 2};
-            const auto there = at == 0 ? here : std::make_shared<const IndexedMesh>(moved(shape.mesh, 1, offset));
-            const uint32_t there_corner = at == 0 ? here_corner : corners;
-            corners += at == 0 ? 0 : floats;
+            const double offset = exponent == 0 ? 0 : std::pow(10.0, exponent);
             for (const auto& [name, transform] : transforms()) {
-                for (const bool vertices : {true, false}) {
-                    if (at == 0 && !vertices) continue;
-                    CampaignPoint point;
-                    point.mesh = shape.mesh.name;
-                    point.transform = name;
-                    point.place = vertices ? "vertices" : "instance";
-                    point.offset = exponent == 0 ? 0 : std::pow(10.0, exponent);
-                    point.promised = !beyond;
-                    point.shape = vertices ? there : here;
-                    point.first_corner = vertices ? there_corner : here_corner;
-                    point.object_to_world =
-                        vertices ? transform
-                                 : translated(transform, float(at), float(-at), float(at / 2));
-                    // Origins keep their distance where floats are coarser than the mesh.
-                    const double reach = std::max(3 * shape.size, std::ldexp(at, -18));
-                    for (int i = 0; i < 3; ++i) point.ball[i] = vertices ? float(offset[i]) : 0;
-                    point.ball[3] = float(reach);
-                    point.convex = shape.convex && at < 5e6;
-                    points.push_back(std::move(point));
-                }
+                list.add(name, transform, offset, true, !beyond);
+                if (offset != 0) list.add(name, transform, offset, false, !beyond);
             }
         }
+        if (!more_transforms) continue;
+        for (const auto& [name, transform] : lab_transforms()) list.add(name, transform, 0, true, true);
     }
     return points;
 }
+
+}  // namespace
+
+std::vector<CampaignPoint> campaign_points(bool beyond) { return make_points(beyond, false); }
+
+std::vector<CampaignPoint> spawn_points() { return make_points(false, true); }
 
 std::vector<float> campaign_corners(const std::vector<CampaignPoint>& points) {
     std::vector<float> corners;
@@ -144,9 +172,9 @@ uint64_t CampaignReport::rays(bool promised) const {
     return sum;
 }
 
-uint64_t CampaignReport::unbalanced(bool promised) const {
+uint64_t CampaignReport::events(bool promised) const {
     uint64_t sum = 0;
-    for (const CampaignRow& row : rows) sum += row.promised == promised ? row.unbalanced : 0;
+    for (const CampaignRow& row : rows) sum += row.promised == promised ? row.events : 0;
     return sum;
 }
 
@@ -157,19 +185,25 @@ CampaignReport run_campaign(CampaignTracer& tracer, const std::vector<CampaignPo
     const Clock::time_point start = Clock::now();
     const uint64_t total = beyond ? settings.beyond : settings.rays;
     const uint64_t share = (total + points.size() - 1) / points.size();
-    tools::Progress progress(beyond ? "leaks beyond the promise" : "leaks", points.size(), settings.quiet);
+    const bool spawn = settings.program == CampaignProgram::Spawn;
+    const std::vector<uint32_t> aims = spawn ? std::vector<uint32_t>{kModeInterior, kModeEdge, kModeVertex}
+                                             : std::vector<uint32_t>{kModeEdge, kModeVertex};
+    tools::Progress progress(spawn ? "self-hits" : (beyond ? "leaks beyond the promise" : "leaks"), points.size(), settings.quiet);
     double rays_done = 0, said = 0;
     for (size_t p = 0; p < points.size() && total; ++p) {
         const CampaignPoint& point = points[p];
         const std::vector<Triangle> triangles = point.shape->soup();
         const Transform world_to_object = invert(point.object_to_world);
+        // Watertight weights of triangles thinner than rounding are no bound on t: spawn.glsl.
+        const bool promised = point.promised && !(settings.program == CampaignProgram::Spawn &&
+                                                  point.mesh == "slivers" && !settings.slivers);
         tracer.use(p);
-        for (const uint32_t aim : {kModeEdge, kModeVertex}) {
-            CampaignRow row{point.mesh, point.transform, point.place, aim == kModeEdge ? "edge" : "vertex",
-                            point.offset, point.promised};
+        for (size_t a = 0; a < aims.size(); ++a) {
+            const uint32_t aim = aims[a];
+            CampaignRow row{point.mesh, point.transform, point.place, aim_name(Aim(aim)), point.offset, promised};
             // What is left of the time, in equal parts.
             const double spent = std::chrono::duration<double>(Clock::now() - start).count();
-            const double parts = 2 * double(points.size() - p) - (aim == kModeVertex ? 1 : 0);
+            const double parts = double(aims.size() * (points.size() - p) - a);
             const double allowed = settings.seconds > 0 ? std::max(0.0, settings.seconds - spent) / parts : 1e30;
             const Clock::time_point row_start = Clock::now();
             size_t kept[2] = {0, 0};
@@ -177,7 +211,7 @@ CampaignReport run_campaign(CampaignTracer& tracer, const std::vector<CampaignPo
                 const bool inside = point.convex && (turn & 1);
                 uint64_t count = std::min<uint64_t>(tracer.lanes(), share - done);
                 if (point.convex && turn == 0) count = std::min(count, (share + 1) / 2);
-                CampaignPush push = push_of(point, aim | (inside ? kModeInside : kModeAxes),
+                CampaignPush push = push_of(point, aim | (inside ? kModeInside : kModeAxes) | (settings.naive ? kModeNaive : 0u),
                                             settings.seed * 0x10001u + uint32_t(p) * 2 + aim + beyond * 0x800u);
                 push.first_low = uint32_t(done);
                 push.first_high = uint32_t(done >> 32);
@@ -185,11 +219,11 @@ CampaignReport run_campaign(CampaignTracer& tracer, const std::vector<CampaignPo
                 CampaignCounters counters{};
                 row.seconds += tracer.launch(push, counters);
                 row.rays += count;
-                row.unbalanced += counters.unbalanced;
+                row.events += counters.events;
                 row.missed += counters.missed;
-                const uint32_t in_ring = std::min(counters.unbalanced, kCampaignRing);
+                const uint32_t in_ring = std::min(counters.events, kCampaignRing);
                 for (uint32_t i = 0; i < in_ring && kept[inside] < kOffendersKept; ++i) {
-                    report.offenders.push_back(judged(counters.ring[i], push, triangles, world_to_object));
+                    report.offenders.push_back(judged(counters.ring[i], push, settings.program, triangles, world_to_object));
                     report.offenders.back().row = report.rows.size();
                     ++kept[inside];
                 }
@@ -203,8 +237,8 @@ CampaignReport run_campaign(CampaignTracer& tracer, const std::vector<CampaignPo
         // Into a file, a line now and then.
         const double now = std::chrono::duration<double>(Clock::now() - start).count();
         if (!settings.quiet && !isatty(STDOUT_FILENO) && now > said + 10) {
-            std::fprintf(stderr, "%zu of %zu places, %.0f million rays, %llu unbalanced, %.0f s\n", p + 1, points.size(),
-                         rays_done * 1e-6, (unsigned long long)(report.unbalanced(true) + report.unbalanced(false)), now);
+            std::fprintf(stderr, "%zu of %zu places, %.0f million rays, %llu events, %.0f s\n", p + 1, points.size(),
+                         rays_done * 1e-6, (unsigned long long)(report.events(true) + report.events(false)), now);
             said = now;
         }
     }

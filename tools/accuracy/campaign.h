@@ -1,5 +1,7 @@
-// Leak campaigns: billions of rays made and judged on the device, through whole ray tracing pipelines over
+// Campaigns: billions of rays made and judged on the device, through whole ray tracing pipelines over
 // structures that the device built. rtc's tiers, or the device's own ray tracing, on the same rays.
+//   leaks: a ray leaves a closed mesh as often as it enters. Events: leaks and double hits.
+//   spawn: rays leave the triangles they hit from rtc/spawn.glsl's origins. Events: hits of that triangle.
 #pragma once
 
 #include <cstdint>
@@ -29,11 +31,15 @@ struct CampaignPoint {
 // 4 meshes x offsets 0, 1e1 ... 1e4 in the vertices and in the instance x identity, rotated, sheared and
 // mirrored; `beyond`: offsets 1e5 ... 1e8 instead.
 std::vector<CampaignPoint> campaign_points(bool beyond);
-// Binding 1 of leaks.rgen for these points, whose shapes may be shared.
+// The former, and transforms that scale by 1e-6 to 1e6, stretch, and lie far away.
+std::vector<CampaignPoint> spawn_points();
+// Binding 1 of the shaders for these points, whose shapes may be shared.
 std::vector<float> campaign_corners(const std::vector<CampaignPoint>& points);
 tools::Scene campaign_scene(const CampaignPoint& point);
 
-// Something that can run leaks.rgen over the points.
+enum class CampaignProgram { Leaks, Spawn };
+
+// Something that can run a program over the points.
 class CampaignTracer {
   public:
     virtual ~CampaignTracer() = default;
@@ -44,7 +50,10 @@ class CampaignTracer {
 };
 
 struct CampaignSettings {
-    uint64_t rays = 1'000'000;  // for each of the two aims, over all points within the promise
+    CampaignProgram program = CampaignProgram::Leaks;
+    bool naive = false;         // spawn: second rays start where t says, as a control
+    bool slivers = false;       // spawn: slivers of 1e-6 are promised too, as tier exact does
+    uint64_t rays = 1'000'000;  // for each aim, over all points within the promise
     uint64_t beyond = 0;        // the same, over all points beyond it
     double seconds = 0;         // stop each point's share in time for the whole to take this long; 0: no limit
     uint32_t seed = 1;
@@ -55,19 +64,19 @@ struct CampaignRow {
     std::string mesh, transform, place, aim;
     double offset = 0;
     bool promised = true;
-    uint64_t rays = 0, unbalanced = 0, missed = 0;
+    uint64_t rays = 0, events = 0, missed = 0;
     double seconds = 0;
 };
 
-// An unbalanced ray, looked at again on the host.
+// The ray of an event, looked at again on the host.
 struct CampaignOffender {
     size_t row = 0;
     uint64_t number = 0;
     bool closest = false;
     bool same_ray = true;  // the host makes the same ray from its number
     Vec3 origin, direction;
-    uint32_t front = 0, back = 0;  // what the device counted
-    ExactBalance exact;            // of the ray in object space, by the host's inverse
+    uint32_t front = 0, back = 0;  // what the device counted; spawn: the triangle, and its hits by this ray
+    ExactBalance exact;            // leaks: of the ray in object space, by the host's inverse
 };
 
 struct CampaignReport {
@@ -76,7 +85,7 @@ struct CampaignReport {
     std::vector<CampaignRow> rows;
     std::vector<CampaignOffender> offenders;  // at most a few of every row
     uint64_t rays(bool promised) const;
-    uint64_t unbalanced(bool promised) const;
+    uint64_t events(bool promised) const;
 };
 
 CampaignReport run_campaign(CampaignTracer& tracer, const std::vector<CampaignPoint>& points, bool beyond,
@@ -87,6 +96,7 @@ CampaignReport run_campaign(CampaignTracer& tracer, const std::vector<CampaignPo
 std::unique_ptr<tools::Context> campaign_context(const std::string& subject, const std::string& device, bool validate);
 // Context and points must outlive the tracer. `lanes`: rays of one launch, 0: as suits the device.
 std::unique_ptr<CampaignTracer> make_campaign_tracer(const tools::Context& context, const std::string& subject,
-                                                     const std::vector<CampaignPoint>& points, uint32_t lanes = 0);
+                                                     CampaignProgram program, const std::vector<CampaignPoint>& points,
+                                                     uint32_t lanes = 0);
 
 }  // namespace rtc::lab

@@ -3,6 +3,7 @@
 #include <map>
 
 #include "../native/executor.h"
+#include "../native/glsl.h"
 #include "campaign.h"
 #include "error.h"
 #include "job_descriptors.h"
@@ -18,17 +19,29 @@ using tools::Buffer;
 using tools::Context;
 using tools::Error;
 
-constexpr uint32_t kRaygen[] = {
+constexpr uint32_t kLeaksRaygen[] = {
 #include "leaks_rgen.inc"
 };
-constexpr uint32_t kAnyHit[] = {
+constexpr uint32_t kLeaksAnyHit[] = {
 #include "leaks_rahit.inc"
 };
-constexpr uint32_t kClosestHit[] = {
+constexpr uint32_t kLeaksClosestHit[] = {
 #include "leaks_rchit.inc"
 };
-constexpr uint32_t kMiss[] = {
+constexpr uint32_t kLeaksMiss[] = {
 #include "leaks_rmiss.inc"
+};
+constexpr uint32_t kSpawnRaygen[] = {
+#include "spawn_rgen.inc"
+};
+constexpr uint32_t kSpawnAnyHit[] = {
+#include "spawn_rahit.inc"
+};
+constexpr uint32_t kSpawnClosestHit[] = {
+#include "spawn_rchit.inc"
+};
+constexpr uint32_t kSpawnMiss[] = {
+#include "spawn_rmiss.inc"
 };
 
 constexpr uint32_t kWidth = 1024;
@@ -40,7 +53,7 @@ uint32_t suitable_lanes(const Context& context, uint32_t wanted) {
 
 // Buffers and the launch that both kinds share.
 struct Launch {
-    Launch(const Context& context, const std::vector<CampaignPoint>& points, uint32_t lanes)
+    Launch(const Context& context, CampaignProgram program, const std::vector<CampaignPoint>& points, uint32_t lanes)
         : context(context),
           corners(tools::upload_vector(context, campaign_corners(points), VK_BUFFER_USAGE_STORAGE_BUFFER_BIT)),
           counters(context, sizeof(CampaignCounters),
@@ -49,11 +62,12 @@ struct Launch {
                    tools::MemoryKind::Device),
           read(context, sizeof(CampaignCounters), VK_BUFFER_USAGE_TRANSFER_DST_BIT, tools::MemoryKind::Readback),
           timer(context) {
-        auto add = [&](tools::JobStage stage, const char* name, auto& words) {
+        auto add = [&](tools::JobStage stage, const auto& leaks, const auto& spawn) {
             tools::JobShader shader;
             shader.stage = stage;
-            shader.name = name;
-            shader.spirv.assign(std::begin(words), std::end(words));
+            shader.name = native::stage_suffix(stage);
+            if (program == CampaignProgram::Leaks) shader.spirv.assign(std::begin(leaks), std::end(leaks));
+            if (program == CampaignProgram::Spawn) shader.spirv.assign(std::begin(spawn), std::end(spawn));
             job.pipeline.shaders.push_back(shader);
             return int(job.pipeline.shaders.size() - 1);
         };
@@ -61,11 +75,11 @@ struct Launch {
             job.pipeline.groups.emplace_back().name = name;
             return job.pipeline.groups.back();
         };
-        group("raygen").general = add(tools::JobStage::RayGen, "leaks.rgen", kRaygen);
-        group("miss").general = add(tools::JobStage::Miss, "leaks.rmiss", kMiss);
+        group("raygen").general = add(tools::JobStage::RayGen, kLeaksRaygen, kSpawnRaygen);
+        group("miss").general = add(tools::JobStage::Miss, kLeaksMiss, kSpawnMiss);
         tools::JobGroup& hit = group("hit");
-        hit.any_hit = add(tools::JobStage::AnyHit, "leaks.rahit", kAnyHit);
-        hit.closest_hit = add(tools::JobStage::ClosestHit, "leaks.rchit", kClosestHit);
+        hit.any_hit = add(tools::JobStage::AnyHit, kLeaksAnyHit, kSpawnAnyHit);
+        hit.closest_hit = add(tools::JobStage::ClosestHit, kLeaksClosestHit, kSpawnClosestHit);
         job.table.raygen.push_back({0, {}});
         job.table.miss.push_back({1, {}});
         job.table.hit.push_back({2, {}});
@@ -111,9 +125,9 @@ struct Launch {
 
 class RtcTracer final : public CampaignTracer {
   public:
-    RtcTracer(const Context& context, const std::string& subject, const std::vector<CampaignPoint>& points,
-              uint32_t lanes)
-        : points_(points), lanes_(lanes), launch_(context, points, lanes), device_(context) {
+    RtcTracer(const Context& context, const std::string& subject, CampaignProgram program,
+              const std::vector<CampaignPoint>& points, uint32_t lanes)
+        : points_(points), lanes_(lanes), launch_(context, program, points, lanes), device_(context) {
         tools::CompileOptions options;
         options.resumable = device_.support.needsResumableModules;
         if (subject == "fast") options.accuracy = RTCC_ACCURACY_FAST;
@@ -158,8 +172,9 @@ class RtcTracer final : public CampaignTracer {
 
 class NativeTracer final : public CampaignTracer {
   public:
-    NativeTracer(const Context& context, const std::vector<CampaignPoint>& points, uint32_t lanes)
-        : lanes_(lanes), launch_(context, points, lanes), executor_(native::make_khr(context)) {
+    NativeTracer(const Context& context, CampaignProgram program, const std::vector<CampaignPoint>& points,
+                 uint32_t lanes)
+        : lanes_(lanes), launch_(context, program, points, lanes), executor_(native::make_khr(context)) {
         native::World world;
         std::map<const IndexedMesh*, int> bottoms;
         for (const CampaignPoint& point : points) {
@@ -225,10 +240,11 @@ std::unique_ptr<Context> campaign_context(const std::string& subject, const std:
 }
 
 std::unique_ptr<CampaignTracer> make_campaign_tracer(const Context& context, const std::string& subject,
-                                                     const std::vector<CampaignPoint>& points, uint32_t lanes) {
+                                                     CampaignProgram program, const std::vector<CampaignPoint>& points,
+                                                     uint32_t lanes) {
     lanes = suitable_lanes(context, lanes);
-    if (subject == "native") return std::make_unique<NativeTracer>(context, points, lanes);
-    return std::make_unique<RtcTracer>(context, subject, points, lanes);
+    if (subject == "native") return std::make_unique<NativeTracer>(context, program, points, lanes);
+    return std::make_unique<RtcTracer>(context, subject, program, points, lanes);
 }
 
 }  // namespace rtc::lab

@@ -8,6 +8,7 @@ namespace rtc::lab {
 
 // argv[0] is the command's own name. Exit status; throws tools::Error.
 int leaks_command(int argc, char** argv);
+int spawn_command(int argc, char** argv);
 int agree_command(int argc, char** argv);
 
 // 95 % bound on a rate of which `events` were seen in `n`: the rule of three when none was, else about two

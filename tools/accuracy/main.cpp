@@ -144,6 +144,7 @@ bool verdict(const Report& report) {
 int run(int argc, char** argv) {
     CLI::App app{"Measures leaks, exactness and cost of rtc's traversal on a device.\n"
                  "rtc-accuracy leaks --help: campaigns whose rays the device makes.\n"
+                 "rtc-accuracy spawn --help: self-hits of rays that leave surfaces.\n"
                  "rtc-accuracy agree --help: first hits against exact arithmetic."};
     std::vector<std::string> tiers = {"watertight"}, axes = {"mesh"};
     std::string device, json_path, markdown_path;
@@ -235,6 +236,7 @@ int main(int argc, char** argv) {
     return rtc::tools::run_program("rtc-accuracy", [&] {
         const std::string command = argc > 1 ? argv[1] : "";
         if (command == "leaks") return leaks_command(argc - 1, argv + 1);
+        if (command == "spawn") return spawn_command(argc - 1, argv + 1);
         if (command == "agree") return agree_command(argc - 1, argv + 1);
         return run(argc, argv);
     });

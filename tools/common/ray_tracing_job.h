@@ -15,8 +15,6 @@ namespace rtc::tools {
 
 enum class JobStage : uint32_t { RayGen, Intersection, AnyHit, ClosestHit, Miss, Callable };
 
-const char* job_stage_suffix(JobStage stage);  // "rgen", "rint", ...
-
 struct JobShader {
     JobStage stage = JobStage::RayGen;
     std::string name;             // unique in the pipeline

@@ -10,7 +10,7 @@
 namespace rtc::lab {
 namespace {
 
-// leaks.rgen, line by line.
+// campaign_ray.glsl, line by line.
 uint32_t pcg(uint32_t v) {
     const uint32_t s = v * 747796405u + 2891336453u;
     const uint32_t w = ((s >> ((s >> 28) + 4)) ^ s) * 277803737u;

@@ -1,5 +1,5 @@
-// Rays of a leak campaign. shaders/leaks.rgen makes them on the device from their number; this is its
-// twin on the host, bit for bit, for whoever wants to look at one again.
+// Rays of a campaign. shaders/campaign_ray.glsl makes them on the device from their number; this is its twin
+// on the host, bit for bit, for whoever wants to look at one again.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace rtc::lab {
 
-// Push constants of leaks.rgen.
+// Push constants.
 struct CampaignPush {
     float object_to_world[12];
     float ball[4];  // centre in object space, half the edge of the cube on which origins lie
@@ -25,13 +25,14 @@ enum CampaignMode : uint32_t {
     kModeVertex = 2,
     kModeInside = 4,  // origins inside a convex mesh
     kModeAxes = 8,    // one ray in eight runs along an axis of the world
+    kModeNaive = 16,  // spawn.rgen: second rays start where t says
 };
 
 constexpr uint32_t kCampaignRing = 32;
 
 // The buffer behind binding 2.
 struct CampaignCounters {
-    uint32_t unbalanced, missed, pad[2];  // rays whose entries and exits do not match; without candidate
+    uint32_t events, missed, pad[2];  // leaks, double hits or self-hits; rays without candidate
     struct Offender {
         uint32_t low, high;  // the ray's number
         uint32_t flags;      // gl_RayFlags*

@@ -1,4 +1,4 @@
-// rtc-accuracy leaks: leak campaigns on the device.
+// rtc-accuracy leaks, rtc-accuracy spawn: campaigns on the device.
 #include <algorithm>
 #include <cstdio>
 #include <functional>
@@ -28,7 +28,7 @@ std::vector<std::pair<std::string, CampaignRow>> summed(const CampaignReport& re
             continue;
         }
         at->second.rays += row.rays;
-        at->second.unbalanced += row.unbalanced;
+        at->second.events += row.events;
         at->second.missed += row.missed;
         at->second.seconds += row.seconds;
     }
@@ -41,38 +41,47 @@ std::string offset_text(double offset) {
     return text;
 }
 
-void table(std::ostringstream& out, const char* columns, const std::vector<std::pair<std::string, CampaignRow>>& rows) {
+const char* event_name(CampaignProgram program) {
+    return program == CampaignProgram::Leaks ? "unbalanced" : "self_hits";
+}
+
+void table(std::ostringstream& out, CampaignProgram program, const char* columns, const std::vector<std::pair<std::string, CampaignRow>>& rows) {
     int count = 1;
     for (const char* c = columns; *c; ++c) count += *c == '|';
-    out << "| " << columns << " | rays | no candidate | unbalanced | rate, 95 % bound | Mrays/s |\n|";
+    out << "| " << columns << " | rays | no candidate | "
+        << (program == CampaignProgram::Leaks ? "unbalanced" : "self-hits") << " | rate, 95 % bound | Mrays/s |\n|";
     for (int i = 0; i < count + 5; ++i) out << "---|";
     out << '\n';
     for (const auto& [name, row] : rows) {
         char line[256];
         std::snprintf(line, sizeof line, "| %s | %llu | %llu | %llu | < %.2g | %.2f |\n", name.c_str(),
                       (unsigned long long)row.rays, (unsigned long long)row.missed,
-                      (unsigned long long)row.unbalanced, upper_bound(row.unbalanced, row.rays),
+                      (unsigned long long)row.events, upper_bound(row.events, row.rays),
                       row.seconds > 0 ? double(row.rays) / row.seconds * 1e-6 : 0.0);
         out << line;
     }
     out << '\n';
 }
 
-std::string markdown(const CampaignReport& report) {
+std::string markdown(const CampaignReport& report, CampaignProgram program) {
     std::ostringstream out;
     out << "### " << report.subject << " on " << report.device << "\n\n";
     if (report.rays(true)) {
-        table(out, "mesh | aimed at",
+        table(out, program, "mesh | aimed at",
               summed(report, true, [](const CampaignRow& r) { return r.mesh + " | " + r.aim; }));
-        table(out, "offset | in | instance",
+        table(out, program, "offset | in | instance",
               summed(report, true, [](const CampaignRow& r) {
                   return offset_text(r.offset) + " | " + r.place + " | " + r.transform;
               }));
     }
-    if (report.rays(false))
-        table(out, "beyond the promise: offset | aimed at", summed(report, false, [](const CampaignRow& r) {
+    if (report.rays(false) && program == CampaignProgram::Spawn)
+        table(out, program, "nothing promised: mesh | aimed at",
+              summed(report, false, [](const CampaignRow& r) { return r.mesh + " | " + r.aim; }));
+    else if (report.rays(false))
+        table(out, program, "beyond the promise: offset | aimed at", summed(report, false, [](const CampaignRow& r) {
                   return offset_text(r.offset) + " | " + r.aim;
               }));
+    if (program == CampaignProgram::Spawn) return out.str();
     size_t leaks = 0, doubles = 0, strange = 0;
     for (const CampaignOffender& o : report.offenders) {
         const uint32_t got = o.front + o.back, due = o.closest ? 1 : o.exact.front + o.exact.back;
@@ -87,17 +96,17 @@ std::string markdown(const CampaignReport& report) {
     return out.str();
 }
 
-nlohmann::ordered_json to_json(const CampaignReport& report) {
+nlohmann::ordered_json to_json(const CampaignReport& report, CampaignProgram program) {
     nlohmann::ordered_json json{{"tier", report.subject}, {"seed", report.seed}};
     for (const CampaignRow& r : report.rows)
-        json["campaign"].push_back({{"mesh", r.mesh},
+        json[program == CampaignProgram::Leaks ? "campaign" : "spawn"].push_back({{"mesh", r.mesh},
                                     {"transform", r.transform},
                                     {"offset", r.offset},
                                     {"offset_in", r.place},
                                     {"aim", r.aim},
                                     {"promised_zero", r.promised},
                                     {"rays", r.rays},
-                                    {"unbalanced", r.unbalanced},
+                                    {event_name(program), r.events},
                                     {"missed", r.missed},
                                     {"seconds", r.seconds}});
     for (const CampaignOffender& o : report.offenders) {
@@ -123,15 +132,20 @@ nlohmann::ordered_json to_json(const CampaignReport& report) {
 }
 
 // What decides the exit code.
-bool verdict(const CampaignReport& report) {
-    const uint64_t broken = report.unbalanced(true);
+bool verdict(const CampaignReport& report, const CampaignSettings& settings) {
+    const uint64_t broken = report.events(true);
+    if (settings.naive) {
+        if (broken == 0) std::fprintf(stderr, "rtc-accuracy: error: the control has no self-hits: this measurement is blind\n");
+        return broken != 0;
+    }
     if (report.subject == "watertight" || report.subject == "exact" || report.subject == "exact64") {
         if (!broken) return true;
-        std::fprintf(stderr, "rtc-accuracy: error: %s: %llu leaks or double hits where none are promised\n",
-                     report.subject.c_str(), (unsigned long long)broken);
+        std::fprintf(stderr, "rtc-accuracy: error: %s: %llu %s where none are promised\n",
+                     report.subject.c_str(), (unsigned long long)broken,
+                     settings.program == CampaignProgram::Leaks ? "leaks or double hits" : "self-hits");
         return false;
     }
-    if (report.subject == "contracted" && broken == 0) {
+    if (report.subject == "contracted" && settings.program == CampaignProgram::Leaks && broken == 0) {
         std::fprintf(stderr,
                      "rtc-accuracy: error: the negative control does not leak: this measurement is blind\n");
         return false;
@@ -139,21 +153,26 @@ bool verdict(const CampaignReport& report) {
     return true;
 }
 
-}  // namespace
-
-int leaks_command(int argc, char** argv) {
-    CLI::App app{"Leak campaigns: rays aimed at edges and vertices of closed meshes, made on the device."};
+int campaign_command(CampaignProgram program, int argc, char** argv) {
+    const bool leaks = program == CampaignProgram::Leaks;
+    CLI::App app{leaks ? "Leaks: rays aimed at edges and vertices of closed meshes, made on the device."
+                       : "Self-hits: rays that leave triangles from the origins of rtc/spawn.glsl, made on the device."};
     std::vector<std::string> tiers = {"watertight"};
     std::string device, json_path, markdown_path;
     CampaignSettings settings;
+    settings.program = program;
     uint32_t lanes = 0;
     bool validate = false;
     app.add_option("--tier", tiers, "watertight, fast, exact, exact64, contracted (the negative control) or "
                                     "native (the device's VK_KHR_ray_tracing_pipeline); several with commas")
         ->delimiter(',');
     app.add_option("--device", device, "device index or part of its name");
-    app.add_option("--rays", settings.rays, "rays aimed at edges, and as many at vertices");
-    app.add_option("--beyond", settings.beyond, "the same for offsets of 1e5 to 1e8, where nothing is promised");
+    app.add_option("--rays", settings.rays, leaks ? "rays aimed at edges, and as many at vertices"
+                                                  : "rays aimed inside, and as many at edges and at vertices");
+    if (leaks)
+        app.add_option("--beyond", settings.beyond, "the same for offsets of 1e5 to 1e8, where nothing is promised");
+    else
+        app.add_flag("--naive", settings.naive, "the control: second rays start where t says, and must hit themselves");
     app.add_option("--seconds", settings.seconds, "stop each tier after about this long, with fewer rays everywhere");
     app.add_option("--seed", settings.seed, "the same seed makes the same rays");
     app.add_option("--lanes", lanes, "rays of one launch");
@@ -161,9 +180,10 @@ int leaks_command(int argc, char** argv) {
     app.add_option("--markdown", markdown_path, "write the tables");
     app.add_flag("--validate", validate, "run under the validation layers");
     app.add_flag("--quiet", settings.quiet, "no progress");
-    if (const int status = tools::parse_command_line(app, "rtc-accuracy leaks", argc, argv); status >= 0) return status;
+    const char* name = leaks ? "rtc-accuracy leaks" : "rtc-accuracy spawn";
+    if (const int status = tools::parse_command_line(app, name, argc, argv); status >= 0) return status;
 
-    const std::vector<CampaignPoint> within = campaign_points(false);
+    const std::vector<CampaignPoint> within = leaks ? campaign_points(false) : spawn_points();
     const std::vector<CampaignPoint> beyond = settings.beyond ? campaign_points(true) : std::vector<CampaignPoint>();
     std::string text;
     nlohmann::ordered_json json;
@@ -172,8 +192,9 @@ int leaks_command(int argc, char** argv) {
         std::unique_ptr<tools::Context> context;
         CampaignReport report;
         try {
+            settings.slivers = tier == "exact" || tier == "exact64";
             context = campaign_context(tier, device, validate);
-            const auto tracer = make_campaign_tracer(*context, tier, within, lanes);
+            const auto tracer = make_campaign_tracer(*context, tier, program, within, lanes);
             report = run_campaign(*tracer, within, false, settings);
         } catch (const tools::MissingFeature& problem) {
             std::printf("%s: skipped: %s\n", tier.c_str(), problem.what());
@@ -184,7 +205,7 @@ int leaks_command(int argc, char** argv) {
             continue;
         }
         if (settings.beyond) {
-            const auto tracer = make_campaign_tracer(*context, tier, beyond, lanes);
+            const auto tracer = make_campaign_tracer(*context, tier, program, beyond, lanes);
             const CampaignReport more = run_campaign(*tracer, beyond, true, settings);
             for (CampaignOffender o : more.offenders) {
                 o.row += report.rows.size();
@@ -192,20 +213,25 @@ int leaks_command(int argc, char** argv) {
             }
             report.rows.insert(report.rows.end(), more.rows.begin(), more.rows.end());
         }
-        report.subject = tier;
+        report.subject = settings.naive ? tier + ", naive origins" : tier;
         report.device = tools::describe_device(context->properties, context->driver);
-        const std::string tables = markdown(report);
+        const std::string tables = markdown(report, program);
         std::fputs(tables.c_str(), stdout);
         std::fflush(stdout);
         text += tables;
         json["device"] = report.device;
-        json["tiers"].push_back(to_json(report));
-        good = verdict(report) && good;
+        json["tiers"].push_back(to_json(report, program));
+        good = verdict(report, settings) && good;
         if (context->validating()) context->require_silent_validation();
         if (!json_path.empty()) write_file(json_path, json.dump(1) + "\n");  // long runs get interrupted
         if (!markdown_path.empty()) write_file(markdown_path, text);
     }
     return good ? 0 : 1;
 }
+
+}  // namespace
+
+int leaks_command(int argc, char** argv) { return campaign_command(CampaignProgram::Leaks, argc, argv); }
+int spawn_command(int argc, char** argv) { return campaign_command(CampaignProgram::Spawn, argc, argv); }
 
 }  // namespace rtc::lab
