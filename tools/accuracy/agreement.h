@@ -15,7 +15,7 @@ struct AgreementRow {
     uint64_t cases = 0, rays = 0, hits = 0;
     uint64_t missed = 0, invented = 0;  // hit by exact arithmetic only, by the device only
     uint64_t inverted = 0;              // another triangle than the first
-    uint64_t denormal = 0;              // of all differences: in cases where denormals are at stake
+    uint64_t denormal = 0;              // of all differences: cases where denormals are at stake, rays that have some
     uint64_t ties = 0, on_edge = 0;     // rays that only a rule decides
     double t_p50 = 0, t_p99 = 0, t_p999 = 0, t_max = 0;  // ulps, cases without denormals
     std::string first;                                   // the first difference, as hexadecimal floats
