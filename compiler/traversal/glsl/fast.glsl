@@ -10,8 +10,7 @@ void rtc_level_numbers(RtcBase base, vec3 o, vec3 d, bool top) {
     rtc_trav_inverse = vec3(1.0 / (abs(d.x) < 1e-30 ? sign_bits.x : d.x),
                             1.0 / (abs(d.y) < 1e-30 ? sign_bits.y : d.y),
                             1.0 / (abs(d.z) < 1e-30 ? sign_bits.z : d.z));
-    rtc_trav_low = o;
-    rtc_trav_high = o;
+    rtc_trav_pad = 0.0;
 }
 
 bool rtc_triangle(vec3 v0, vec3 v1, vec3 v2, out float t, out float b1, out float b2, out bool front,

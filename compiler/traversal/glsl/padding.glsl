@@ -34,6 +34,9 @@ const float RTC_SLAB_GROWTH = 1.00000143; // 1 + 24u
 // off by at most 8u of D.kz / |d.kz|, which is 8u r along any axis, and t is
 // compared with near of the box, itself 9u r off: 5u D + 28u r covers all.
 //
+// One number pads all axes, that of the widest: five more registers while a
+// ray walks cost a GPU more than the boxes that are visited in vain.
+//
 // The padded origin fl(o + pad) must not round back: 2u |o| more. A direction
 // that is (almost) 0 along an axis is replaced by 2^-48 of the largest, with
 // its sign, which moves the ray by 2^-48 D.kz: 2^-47 D.kz more. Differences
@@ -70,12 +73,11 @@ void rtc_level_numbers(RtcBase base, vec3 o, vec3 d, bool top) {
 
     vec3 distance = max(abs(bounds_min - o), abs(bounds_max - o));
     float reach = rtc_axes(distance).z;
-    float longest = reach / speed;
-    vec3 pad = distance * RTC_PAD_D + a * (longest * RTC_PAD_R);
+    // The way along an axis is at most the way along kz, reach, and so r <= reach.
+    float widest = rtc_largest(distance);
+    float pad = widest * RTC_PAD_D + reach * RTC_PAD_R;
     if (top) {
-        pad = max(pad, vec3(rtc_largest(o) * RTC_PAD_TOP_ORIGIN + rtc_largest(distance) * RTC_PAD_TOP_D));
+        pad = max(pad, rtc_largest(o) * RTC_PAD_TOP_ORIGIN + widest * RTC_PAD_TOP_D);
     }
-    pad = (pad + abs(o) * RTC_PAD_ORIGIN) + vec3(reach * (2.0 * RTC_TINY) + RTC_PAD_FLUSH);
-    rtc_trav_low = o + pad;
-    rtc_trav_high = o - pad;
+    rtc_trav_pad = (pad + rtc_largest(o) * RTC_PAD_ORIGIN) + (reach * (2.0 * RTC_TINY) + RTC_PAD_FLUSH);
 }

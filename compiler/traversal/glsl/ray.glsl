@@ -48,8 +48,7 @@ float rtc_trav_tmax;
 vec3 rtc_trav_origin; // this level's ray
 vec3 rtc_trav_direction;
 vec3 rtc_trav_inverse; // finite reciprocal of the direction, for slabs
-vec3 rtc_trav_low; // origins for the planes of box minima and maxima
-vec3 rtc_trav_high;
+float rtc_trav_pad; // how far the origin is moved for the planes of box minima (up) and maxima (down)
 
 const uint RTC_REF_POP = 0xffffffffu;
 const uint RTC_REF_DONE = 0xfffffffeu;

@@ -159,8 +159,8 @@ bool rtc_report_begin(float t, uint kind) {
 
 // Entry distance of a box, and whether the ray meets it in [tmin, tmax].
 bool rtc_slab(vec3 low, vec3 high, out float near) {
-    vec3 t0 = (low - rtc_trav_low) * rtc_trav_inverse;
-    vec3 t1 = (high - rtc_trav_high) * rtc_trav_inverse;
+    vec3 t0 = (low - (rtc_trav_origin + vec3(rtc_trav_pad))) * rtc_trav_inverse;
+    vec3 t1 = (high - (rtc_trav_origin - vec3(rtc_trav_pad))) * rtc_trav_inverse;
     vec3 enter = min(t0, t1);
     vec3 leave = max(t0, t1);
     near = max(max(enter.x, enter.y), max(enter.z, rtc_trav_tmin));
