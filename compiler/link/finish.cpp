@@ -35,17 +35,19 @@ bool is_ray_tracing(const std::string& extension) {
 void place_reserved(Program& p, continuation::Machine& machine, const LinkOptions& options, Reflection& reflection) {
     std::set<Id> ours;
     for (const auto& [binding, id] : machine.reserved) ours.insert(id);
-    int32_t highest = -1;
+    uint64_t next = 0;  // the set above the highest one used
     std::set<std::pair<uint32_t, uint32_t>> taken;
     for (const Inst& inst : p.module.globals) {
         if (inst.op != Op::OpVariable || ours.count(inst.result)) continue;
         uint32_t set = 0, binding = 0;
         if (!p.decoration(inst.result, spv::Decoration::DescriptorSet, &set)) continue;
         p.decoration(inst.result, spv::Decoration::Binding, &binding);
-        highest = std::max(highest, static_cast<int32_t>(set));
+        next = std::max(next, uint64_t{set} + 1);
         taken.insert({set, binding});
     }
-    const uint32_t set = options.reserved_set >= 0 ? static_cast<uint32_t>(options.reserved_set) : highest + 1;
+    if (options.reserved_set < 0 && next > UINT32_MAX)
+        ir::fail("reserved-conflict", "", 0, "the shaders use the highest set there is; choose one with --reserved=SET.BINDING");
+    const uint32_t set = options.reserved_set >= 0 ? static_cast<uint32_t>(options.reserved_set) : static_cast<uint32_t>(next);
     for (const auto& [binding, id] : machine.reserved) {
         if (taken.count({set, options.reserved_binding + binding}))
             ir::fail("reserved-conflict", "", 0,

@@ -265,6 +265,19 @@ TEST(Diagnostics, ReservedConflict) {
     expect_error(link({{StageKind::RayGen, module_of(tracing_raygen())}}, options), "reserved-conflict");
 }
 
+// Without --reserved the set above the highest one used is taken.
+TEST(Diagnostics, NoSetAboveTheHighest) {
+    std::string text = stage_text(tracing_raygen());
+    const std::string set = "OpDecorate %scene DescriptorSet ";
+    const size_t at = text.find(set) + set.size();
+    const auto with_set = [&](const char* number) {
+        return link({{StageKind::RayGen, assemble(std::string(text).replace(at, 1, number))}});
+    };
+    EXPECT_EQ(with_set("6").reflection.reserved_set, 7u);
+    EXPECT_EQ(with_set("2147483647").reflection.reserved_set, 2147483648u);
+    expect_error(with_set("4294967295"), "reserved-conflict");
+}
+
 TEST(Diagnostics, SpecialisationOfNoConstant) {
     Stage specialised{StageKind::RayGen, module_of(tracing_raygen()), "main", {{4711, 1}}};
     const LinkResult result = link({specialised});
