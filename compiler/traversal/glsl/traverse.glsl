@@ -13,9 +13,21 @@ const uint RTC_STEP_UNDECIDED = 6u; // inside rtc_trace_step only: floats do not
 bool rtc_inner(uint reference) { return (reference & RTC_REF_LEAF) == 0u; }
 uint rtc_count(uint reference) { return (reference >> RTC_REF_COUNT_SHIFT) & RTC_REF_COUNT_MASK; }
 
+// Turns that one triangle can take in exact arithmetic at worst, where nothing can suspend: nine determinants
+// of edges (wide.glsl: 12 + 3 * 43 + 2 turns each) and two comparisons of t (four determinants, 37^2 products
+// of limbs and 74 columns each). Lavapipe 22.3 counts the turns of all lanes of a group, which may take theirs
+// one after another, and ends all loops without a word: budgets that have room for that many leave it.
+#ifdef RTC_TIER_EXACT
+const uint RTC_TURNS_OF_A_TRIANGLE = 5400u;
+const uint RTC_WALK_BUDGET =
+    RTC_STEP_BUDGET > RTC_TURNS_OF_A_TRIANGLE + 1024u ? RTC_STEP_BUDGET - RTC_TURNS_OF_A_TRIANGLE : RTC_STEP_BUDGET;
+#else
+#define RTC_WALK_BUDGET RTC_STEP_BUDGET
+#endif
+
 // A lane suspends only while its stack fits what rtc_trace_save keeps.
 bool rtc_budget_spent() {
-    return RTC_LINK_RESUMABLE && RTC_STEP_BUDGET != 0xffffffffu && rtc_turns >= RTC_STEP_BUDGET && rtc_sp() <= RTC_TRAVERSAL_STACK;
+    return RTC_LINK_RESUMABLE && RTC_STEP_BUDGET != 0xffffffffu && rtc_turns >= RTC_WALK_BUDGET && rtc_sp() <= RTC_TRAVERSAL_STACK;
 }
 
 // Is the scene what the module was told that scenes are? If not, the lane ends here (rtc_refused): whatever
@@ -369,7 +381,11 @@ uint rtc_trace_step() {
                                 rtc_trav_cur = here;
                             }
                             rtc_turns++;
+#ifdef RTC_TIER_EXACT
+                        } while (result == RTC_STEP_RUNNING && rtc_trav_cur < RTC_REF_DONE && !rtc_budget_spent());
+#else
                         } while (result == RTC_STEP_RUNNING && rtc_trav_cur < RTC_REF_DONE);
+#endif
                     }
                 }
             }
