@@ -21,6 +21,25 @@ struct BuildInput {
     bool fast_build = false, low_memory = false, allow_update = false;
 };
 
+// The mesh as one opaque geometry, whose vertices and indices lie in these buffers.
+inline VkGeometryNV mesh_geometry(const tools::Mesh& mesh, VkBuffer positions, VkBuffer indices) {
+    VkGeometryNV geometry{};
+    geometry.sType = VK_STRUCTURE_TYPE_GEOMETRY_NV;
+    geometry.geometryType = VK_GEOMETRY_TYPE_TRIANGLES_NV;
+    geometry.flags = VK_GEOMETRY_OPAQUE_BIT_NV;
+    geometry.geometry.aabbs.sType = VK_STRUCTURE_TYPE_GEOMETRY_AABB_NV;
+    VkGeometryTrianglesNV& triangles = geometry.geometry.triangles;
+    triangles.sType = VK_STRUCTURE_TYPE_GEOMETRY_TRIANGLES_NV;
+    triangles.vertexData = positions;
+    triangles.vertexCount = uint32_t(mesh.positions.size());
+    triangles.vertexStride = sizeof(glm::vec3);
+    triangles.vertexFormat = VK_FORMAT_R32G32B32_SFLOAT;
+    triangles.indexData = indices;
+    triangles.indexCount = uint32_t(mesh.indices.size());
+    triangles.indexType = VK_INDEX_TYPE_UINT32;
+    return geometry;
+}
+
 class BuildSubject {
   public:
     explicit BuildSubject(std::string name_) : name(std::move(name_)) {}

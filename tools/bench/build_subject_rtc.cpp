@@ -24,19 +24,7 @@ class RtcSubject final : public BuildSubject {
         const tools::Context& context = device.context;
         positions_ = upload_vector(context, input.mesh.positions, RTR_INPUT_BUFFER_USAGE);
         indices_ = upload_vector(context, input.mesh.indices, RTR_INPUT_BUFFER_USAGE);
-        geometry_.sType = VK_STRUCTURE_TYPE_GEOMETRY_NV;
-        geometry_.geometryType = VK_GEOMETRY_TYPE_TRIANGLES_NV;
-        geometry_.flags = VK_GEOMETRY_OPAQUE_BIT_NV;
-        geometry_.geometry.aabbs.sType = VK_STRUCTURE_TYPE_GEOMETRY_AABB_NV;
-        VkGeometryTrianglesNV& triangles = geometry_.geometry.triangles;
-        triangles.sType = VK_STRUCTURE_TYPE_GEOMETRY_TRIANGLES_NV;
-        triangles.vertexData = positions_.handle;
-        triangles.vertexCount = uint32_t(input.mesh.positions.size());
-        triangles.vertexStride = sizeof(glm::vec3);
-        triangles.vertexFormat = VK_FORMAT_R32G32B32_SFLOAT;
-        triangles.indexData = indices_.handle;
-        triangles.indexCount = uint32_t(input.mesh.indices.size());
-        triangles.indexType = VK_INDEX_TYPE_UINT32;
+        geometry_ = mesh_geometry(input.mesh, positions_.handle, indices_.handle);
 
         info_.sType = VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV;
         info_.flags = input.fast_build ? VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_BUILD_BIT_NV

@@ -11,27 +11,9 @@
 
 namespace {
 
-class InstanceCheckTest : public LaunchTest {
+class InstanceCheckTest : public ValidatedLaunchTest {
   protected:
-    void SetUp() override {
-        RuntimeTest::SetUp();
-        if (!vk) return;
-        RtrDeviceCreateInfo info{};
-        info.instance = vk->instance;
-        info.physicalDevice = vk->physical_device;
-        info.device = vk->device;
-        info.pfnGetInstanceProcAddr = vk->get_instance_proc_addr;
-        auto messenger = vk->messenger_info(true);
-        info.pMessenger = &messenger;
-        info.bufferDeviceAddress = vk->GetBufferDeviceAddress != nullptr;
-        info.validation = VK_TRUE;
-        ASSERT_EQ(rtrCreateDevice(&info, nullptr, &rtr), VK_SUCCESS);
-    }
-    void TearDown() override {
-        auto device = rtr;
-        LaunchTest::TearDown();
-        if (vk) rtrDestroyDevice(device, nullptr);
-    }
+    InstanceCheckTest() : ValidatedLaunchTest(true, true) {}
 
     std::vector<bool> modes() const {
         return vk->GetBufferDeviceAddress ? std::vector<bool>{false, true} : std::vector<bool>{false};

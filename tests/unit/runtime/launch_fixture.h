@@ -73,3 +73,33 @@ class LaunchTest : public RuntimeTest {
     VkDescriptorSet set = VK_NULL_HANDLE;
     RtrPipeline pipeline = nullptr;
 };
+
+// Launches on an RtrDevice of the test's own, with validation.
+class ValidatedLaunchTest : public LaunchTest {
+  protected:
+    explicit ValidatedLaunchTest(bool messages = true, bool addresses = false)
+        : messages_(messages), addresses_(addresses) {}
+
+    void SetUp() override {
+        RuntimeTest::SetUp();
+        if (!vk) return;
+        RtrDeviceCreateInfo info{};
+        info.instance = vk->instance;
+        info.physicalDevice = vk->physical_device;
+        info.device = vk->device;
+        info.pfnGetInstanceProcAddr = vk->get_instance_proc_addr;
+        auto messenger = vk->messenger_info(true);
+        if (messages_) info.pMessenger = &messenger;
+        info.bufferDeviceAddress = addresses_ && vk->GetBufferDeviceAddress != nullptr;
+        info.validation = VK_TRUE;
+        ASSERT_EQ(rtrCreateDevice(&info, nullptr, &rtr), VK_SUCCESS);
+    }
+    void TearDown() override {
+        auto device = rtr;
+        LaunchTest::TearDown();
+        if (vk) rtrDestroyDevice(device, nullptr);
+    }
+
+  private:
+    bool messages_, addresses_;
+};

@@ -8,24 +8,9 @@
 
 namespace {
 
-class ThreadsTest : public LaunchTest {
+class ThreadsTest : public ValidatedLaunchTest {
   protected:
-    void SetUp() override {
-        RuntimeTest::SetUp();
-        if (!vk) return;
-        RtrDeviceCreateInfo info{};
-        info.instance = vk->instance;
-        info.physicalDevice = vk->physical_device;
-        info.device = vk->device;
-        info.pfnGetInstanceProcAddr = vk->get_instance_proc_addr;
-        info.validation = VK_TRUE;
-        ASSERT_EQ(rtrCreateDevice(&info, nullptr, &rtr), VK_SUCCESS);
-    }
-    void TearDown() override {
-        auto device = rtr;
-        LaunchTest::TearDown();
-        if (vk) rtrDestroyDevice(device, nullptr);
-    }
+    ThreadsTest() : ValidatedLaunchTest(false) {}
 };
 
 constexpr auto kUpdate = VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV;

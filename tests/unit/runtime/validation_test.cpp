@@ -6,27 +6,8 @@
 
 namespace {
 
-class ValidationTest : public LaunchTest {
+class ValidationTest : public ValidatedLaunchTest {
   protected:
-    void SetUp() override {
-        RuntimeTest::SetUp();
-        if (!vk) return;
-        RtrDeviceCreateInfo info{};
-        info.instance = vk->instance;
-        info.physicalDevice = vk->physical_device;
-        info.device = vk->device;
-        info.pfnGetInstanceProcAddr = vk->get_instance_proc_addr;
-        auto messenger = vk->messenger_info(true);
-        info.pMessenger = &messenger;
-        info.validation = VK_TRUE;
-        ASSERT_EQ(rtrCreateDevice(&info, nullptr, &rtr), VK_SUCCESS);
-    }
-    void TearDown() override {
-        auto device = rtr;
-        LaunchTest::TearDown();
-        if (vk) rtrDestroyDevice(device, nullptr);
-    }
-
     // One ray that misses everything: hits[0].t becomes ~0 where the launch ran.
     RtrLaunchError launch(bool sized, VkDeviceSize miss_size, uint32_t foreign_record) {
         Scene scene(*vk, rtr, 1 << 16);
