@@ -278,7 +278,8 @@ VkResult rtrBindAccelerationStructureMemory(RtrDevice d, uint32_t count,
 VkResult rtrGetAccelerationStructureHandle(RtrDevice d, RtrAccelerationStructure as, size_t size,
                                            void* data) {
     if (!as->buffer)
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "not-bound", "handle of an unbound structure");
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "not-bound",
+                         "handle of an unbound structure: rtrBindAccelerationStructureMemory first");
     if (size < sizeof as->base)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "handle-size", "dataSize must be 8 or more");
     memcpy(data, &as->base, sizeof as->base);
@@ -289,7 +290,7 @@ VkResult rtrGetAccelerationStructureDescriptor(RtrDevice d, RtrAccelerationStruc
                                                VkDescriptorBufferInfo* info) {
     if (!as->buffer)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "not-bound",
-                         "descriptor of an unbound structure");
+                         "descriptor of an unbound structure: rtrBindAccelerationStructureMemory first");
     *info = rtr_header_info(as);
     return VK_SUCCESS;
 }

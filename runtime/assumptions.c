@@ -69,7 +69,8 @@ VkResult rtrCmdDeclareScene(RtrRecorder r, uint32_t count, const RtrAcceleration
     for (i = count; i-- > 0;) {
         const struct RtrAccelerationStructure_T* as = structures[i];
         if (!as)
-            return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "declare-scene", "structure %u is NULL", i);
+            return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "declare-scene", "structure %u is NULL; name those that launches reach",
+                             i);
         if (as->type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV) continue;
         for (g = as->geometry_count; g-- > 0;) {
             if (as->aabbs)

@@ -35,7 +35,7 @@ VkResult rtrCmdBindDescriptorSets(RtrRecorder r, uint32_t firstSet, uint32_t cou
     r->set_call_count = kept;
     if (r->set_call_count == RTR_MAX_SET_CALLS)
         return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "bind-sets",
-                         "too many overlapping binds");
+                         "more than %u calls that overlap in part; bind such sets in one call", RTR_MAX_SET_CALLS);
     call = &r->set_calls[r->set_call_count++];
     call->first = firstSet;
     call->count = count;

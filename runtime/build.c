@@ -93,7 +93,7 @@ static VkResult check_build(RtrBuild* b, const VkAccelerationStructureInfoNV* in
                          "build: scratch buffer missing or scratchOffset not a multiple of 256");
     if (update && !(dst->flags & VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV))
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "update-not-allowed",
-                         "update of a structure without ALLOW_UPDATE");
+                         "update of a structure without ALLOW_UPDATE: create and build it with that flag");
     if (update && src && (src->type != dst->type || src->flags != dst->flags || !src->buffer))
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "update-src",
                          "update: src is of another type, was created with other flags, or is not bound");

@@ -55,7 +55,7 @@ static VkResult create_kernels(RtrDevice d, VkPipelineCache cache, const VkAlloc
         module.pCode = code->words;
         r = d->vk.CreateShaderModule(d->device, &module, a, &handle);
         if (r != VK_SUCCESS)
-            return rtr_error(d, r, "kernel", "kernel '%s': vkCreateShaderModule failed", code->name);
+            return rtr_error(d, r, "kernel", "kernel '%s': vkCreateShaderModule failed (VkResult %d)", code->name, r);
         info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
         info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
         info.stage.module = handle;
@@ -65,7 +65,8 @@ static VkResult create_kernels(RtrDevice d, VkPipelineCache cache, const VkAlloc
         r = d->vk.CreateComputePipelines(d->device, cache, 1, &info, a, &d->kernels[k]);
         d->vk.DestroyShaderModule(d->device, handle, a);
         if (r != VK_SUCCESS)
-            return rtr_error(d, r, "kernel", "kernel '%s': vkCreateComputePipelines failed", code->name);
+            return rtr_error(d, r, "kernel", "kernel '%s': vkCreateComputePipelines failed (VkResult %d)", code->name,
+                             r);
     }
     return VK_SUCCESS;
 }
@@ -100,8 +101,7 @@ VkResult rtrCreateDevice(const RtrDeviceCreateInfo* info, const VkAllocationCall
     if ((r = rtr_check_chain(d, "RtrDeviceCreateInfo", info->pNext)) != VK_SUCCESS) goto fail;
     if (!rtr_load_instance_table(d->instance, info->pfnGetInstanceProcAddr, &d->vki, &missing) ||
         !rtr_load_device_table(&d->vki, d->device, &d->vk, &missing)) {
-        r = rtr_error(d, VK_ERROR_INITIALIZATION_FAILED, "entry-point", "Vulkan entry point %s is missing",
-                      missing);
+        r = rtr_error(d, VK_ERROR_INITIALIZATION_FAILED, "entry-point", "pfnGetInstanceProcAddr finds no %s: give it a loader and a device of Vulkan 1.1 or later", missing);
         goto fail;
     }
     r = rtrGetPhysicalDeviceSupport(d->instance, d->physical_device, info->pfnGetInstanceProcAddr,
@@ -112,7 +112,7 @@ VkResult rtrCreateDevice(const RtrDeviceCreateInfo* info, const VkAllocationCall
             const RtrRequirement* q = &d->support.requirements[i];
             if (!q->met)
                 rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "unsupported-device",
-                          "%s: rtc needs %llu, the device has %llu", q->name, (unsigned long long)q->required,
+                          "%s: rtc needs %llu, the device has %llu (rtc-info lists all that is asked of one)", q->name, (unsigned long long)q->required,
                           (unsigned long long)q->available);
         }
         r = VK_ERROR_FEATURE_NOT_PRESENT;
@@ -136,10 +136,12 @@ VkResult rtrCreateDevice(const RtrDeviceCreateInfo* info, const VkAllocationCall
     d->limits = properties.properties.limits;
     rtr_make_blob_version(&id, d->blob_version);
     if ((r = rtr_learn_features(d, info->pDeviceCreateInfo)) != VK_SUCCESS) {
-        rtr_error(d, r, "features", "the features and extensions of the device could not be queried");
+        rtr_error(d, r, "features", "the features and extensions of the device could not be queried (VkResult %d); pDeviceCreateInfo would "
+                  "tell them", r);
         goto fail;
     }
     r = create_layouts(d, allocator);
+    if (r != VK_SUCCESS) rtr_error(d, r, "kernel", "the layouts of the kernels could not be created (VkResult %d)", r);
     if (r == VK_SUCCESS) r = create_kernels(d, info->pipelineCache, allocator);
     if (r != VK_SUCCESS) goto fail;
     *pDevice = d;

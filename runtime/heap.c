@@ -36,7 +36,7 @@ VkResult rtrCreateHeap(RtrDevice d, const RtrHeapCreateInfo* info, const VkAlloc
     r = d->vk.CreateBufferView(d->device, &view, a, &h->view);
     if (r != VK_SUCCESS) {
         rtr_free(a, h);
-        return rtr_error(d, r, "heap-view", "heap: vkCreateBufferView failed");
+        return rtr_error(d, r, "heap-view", "heap: vkCreateBufferView failed (VkResult %d)", r);
     }
     *pHeap = h;
     return VK_SUCCESS;

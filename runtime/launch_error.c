@@ -7,8 +7,7 @@ uint32_t rtrGetLaunchCount(RtrRecorder r) { return r->launch_count; }
 
 VkResult rtrGetLaunchErrorLocation(RtrRecorder r, uint32_t index, VkDescriptorBufferInfo* info) {
     if (index >= r->launch_count)
-        return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "launch-index", "launch %u of %u", index,
-                         r->launch_count);
+        return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "launch-index", "launch %u of the %u that were recorded since the recorder was retired", index, r->launch_count);
     info->buffer = r->control;
     info->offset = r->launches[index].offset;
     info->range = r->launches[index].size;

@@ -134,7 +134,7 @@ static VkResult create_layout(RtrDevice d, const RtrRayTracingPipelineCreateInfo
             rtr_reserved_bindings(p->header.used_bindings, p->header.reserved_binding, reserved);
         set.pBindings = reserved;
         r = d->vk.CreateDescriptorSetLayout(d->device, &set, a, &p->reserved_layout);
-        if (r != VK_SUCCESS) return rtr_error(d, r, "reserved-set", "vkCreateDescriptorSetLayout failed");
+        if (r != VK_SUCCESS) return rtr_error(d, r, "reserved-set", "vkCreateDescriptorSetLayout failed (VkResult %d)", r);
         sets[p->header.reserved_set] = p->reserved_layout;
     }
     range.size = p->push_size;
@@ -143,7 +143,7 @@ static VkResult create_layout(RtrDevice d, const RtrRayTracingPipelineCreateInfo
     layout.pushConstantRangeCount = p->push_size ? 1 : 0;
     layout.pPushConstantRanges = &range;
     r = d->vk.CreatePipelineLayout(d->device, &layout, a, &p->layout);
-    return r == VK_SUCCESS ? r : rtr_error(d, r, "pipeline-layout", "vkCreatePipelineLayout failed");
+    return r == VK_SUCCESS ? r : rtr_error(d, r, "pipeline-layout", "vkCreatePipelineLayout failed (VkResult %d)", r);
 }
 
 /* The application's constants with ours behind them. */
@@ -191,7 +191,7 @@ static VkResult create_pipeline(RtrDevice d, VkPipelineCache cache,
         module.codeSize = info->codeSize;
         module.pCode = info->pCode;
         r = d->vk.CreateShaderModule(d->device, &module, a, &handle);
-        if (r != VK_SUCCESS) rtr_error(d, r, "shader-module", "vkCreateShaderModule failed");
+        if (r != VK_SUCCESS) rtr_error(d, r, "shader-module", "vkCreateShaderModule failed (VkResult %d)", r);
     }
     if (r == VK_SUCCESS) {
         create.flags = info->flags & ~(VkPipelineCreateFlags)VK_PIPELINE_CREATE_DEFER_COMPILE_BIT_NV;
@@ -202,7 +202,7 @@ static VkResult create_pipeline(RtrDevice d, VkPipelineCache cache,
         create.stage.pSpecializationInfo = &merged;
         create.layout = p->layout;
         r = d->vk.CreateComputePipelines(d->device, cache, 1, &create, a, &p->pipeline);
-        if (r != VK_SUCCESS) rtr_error(d, r, "pipeline", "vkCreateComputePipelines failed");
+        if (r != VK_SUCCESS) rtr_error(d, r, "pipeline", "vkCreateComputePipelines failed (VkResult %d)", r);
     }
     d->vk.DestroyShaderModule(d->device, handle, a);
     rtr_free(a, entries);
@@ -271,8 +271,7 @@ VkResult rtrCreateRayTracingPipeline(RtrDevice d, VkPipelineCache cache,
     *pPipeline = NULL;
     if ((r = rtr_check_chain(d, "RtrRayTracingPipelineCreateInfo", info->pNext)) != VK_SUCCESS) return r;
     if (info->setLayoutCount > 32)
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "set-layouts", "%u set layouts",
-                         info->setLayoutCount);
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "set-layouts", "%u set layouts; at most 32", info->setLayoutCount);
     if ((r = rtr_parse_module(d, info->pCode, info->codeSize, a, &module)) != VK_SUCCESS) return r;
     p = rtr_alloc(a, sizeof *p);
     if (!p) {
@@ -293,8 +292,8 @@ VkResult rtrCreateRayTracingPipeline(RtrDevice d, VkPipelineCache cache,
         if (end > p->push_size) p->push_size = end;
     }
     if (p->push_size > RTR_MAX_PUSH_BYTES)
-        r = rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "push-constants", "%u bytes of push constants",
-                      p->push_size);
+        r = rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "push-constants", "%u bytes of push constants; at most %u", p->push_size,
+                      RTR_MAX_PUSH_BYTES);
     if (r == VK_SUCCESS) r = rtr_check_features(d, info->pCode, info->codeSize);
     if (r == VK_SUCCESS) r = pick_options(d, &module, info->pOptions, &p->options);
     if (r == VK_SUCCESS) r = check_limits(d, &module, &p->options, p->set_layout_count, p->push_size);

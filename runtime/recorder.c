@@ -48,7 +48,7 @@ void rtrDestroyRecorder(RtrDevice d, RtrRecorder r, const VkAllocationCallbacks*
 VkResult rtrBeginRecorder(RtrRecorder r, VkCommandBuffer cmd) {
     if (!cmd)
         return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "command-buffer",
-                         "rtrBeginRecorder: no command buffer");
+                         "rtrBeginRecorder: commandBuffer is VK_NULL_HANDLE; one in the recording state is needed");
     r->cmd = cmd;
     r->pipeline = NULL;
     r->set_call_count = 0;
@@ -100,7 +100,7 @@ static VkResult add_pool(RtrRecorder r) {
     result = r->device->vk.CreateDescriptorPool(r->device->device, &info, own(r), &pool->pool);
     if (result != VK_SUCCESS) {
         rtr_free(own(r), pool);
-        return rtr_error(r->device, result, "descriptor-pool", "vkCreateDescriptorPool failed");
+        return rtr_error(r->device, result, "descriptor-pool", "vkCreateDescriptorPool failed (VkResult %d)", result);
     }
     for (end = &r->pools; *end; end = &(*end)->next) {
     }

@@ -539,7 +539,7 @@ static VkResult trace(RtrRecorder r, const RtrStridedBufferRegion* raygen, const
     if (!r->cmd) return rtr_not_begun(r, "rtrCmdTraceRays");
     if (!r->pipeline)
         return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "no-pipeline",
-                         "rtrCmdTraceRays: no pipeline is bound");
+                         "rtrCmdTraceRays: no pipeline is bound; rtrCmdBindPipeline first");
     if (!r->pipeline->pipeline)
         return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "not-compiled",
                          "rtrCmdTraceRays: the pipeline was created with DEFER_COMPILE; rtrCompileDeferred "

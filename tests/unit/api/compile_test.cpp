@@ -148,4 +148,22 @@ TEST(Compile, ModulesFromBytes) {
     }
 }
 
+TEST(Compile, MisuseHasIds) {
+    Compiler compiler(rtcc_compiler_create());
+    const Result none(rtcc_compile_stage(nullptr, RTCC_STAGE_AUTO, "a.rmiss", kMiss.data(), kMiss.size(), nullptr));
+    EXPECT_EQ(rtcc_result_status(none.get()), RTCC_STATUS_INVALID_ARGUMENT);
+    ASSERT_EQ(rtcc_result_error_count(none.get()), 1u);
+    EXPECT_STREQ(rtcc_result_diagnostic(none.get(), 0).id, "invalid-argument");
+    // A stage is no linked pipeline.
+    const Result stage = compile_stage(kMiss, "a.rmiss");
+    const Result reflection(rtcc_reflect_module(compiler.get(), "a.spv", rtcc_result_words(stage.get()),
+                                                rtcc_result_word_count(stage.get())));
+    EXPECT_EQ(rtcc_result_status(reflection.get()), RTCC_STATUS_NO_REFLECTION);
+    ASSERT_EQ(rtcc_result_error_count(reflection.get()), 1u);
+    const rtcc_diagnostic message = rtcc_result_diagnostic(reflection.get(), 0);
+    EXPECT_STREQ(message.id, "no-reflection");
+    EXPECT_STREQ(message.file, "a.spv");
+    EXPECT_STRNE(message.text, "");
+}
+
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "frontend/frontend.h"
+
 namespace {
 
 std::vector<rtc::Diagnostic> parsed(const std::string& log) {
@@ -74,6 +76,43 @@ TEST(Messages, OddTextIsKept) {
     const auto out = parsed("ERROR: 99999999999: x\n");
     ASSERT_EQ(out.size(), 1u);
     EXPECT_EQ(out[0].line, 0u);
+}
+
+// What the front end says itself, before glslang: id, line and advice.
+TEST(Messages, OfTheFrontEndHaveIds) {
+    const std::string body = "void main() {}\n", nv = "#extension GL_NV_ray_tracing : require\n";
+    const struct {
+        const char* id;
+        const char* file;
+        std::string text;
+        const char* version;  // -std
+        uint32_t line;
+        const char* says;
+    } rows[] = {
+        {"version-missing", "a.rgen", nv + body, "", 1, "begin the shader with #version 460"},
+        {"version-unsupported", "a.rgen", "#version 450\n" + nv + body, "", 1, "460"},
+        {"std-unknown", "a.rgen", "#version 460\n" + nv + body, "4.6", 0, "invalid GLSL version '4.6'"},
+        {"extension-missing", "a.rmiss",
+         "#version 460\nlayout(location = 0) rayPayloadInNV vec4 c;\nvoid main() { c = vec4(0.0); }\n", "", 1,
+         "write #extension GL_NV_ray_tracing : require"},
+        {"shader-stage-unknown", "a.glsl", "#version 460\n" + nv + body, "", 0, "no file extension .rgen"},
+        {"shader-stage-unknown", "a.glsl", "#version 460\n#pragma shader_stage(vertex)\n" + body, "", 2,
+         "expected raygen, intersection, anyhit, closesthit, miss or callable"},
+        {"shader-stage-conflict", "a.glsl",
+         "#version 460\n#pragma shader_stage(miss)\n#pragma shader_stage(callable)\n" + body, "", 3,
+         "conflicts with an earlier 'shader_stage(miss)' in line 2"},
+    };
+    for (auto& row : rows) {
+        rtc::FrontendOptions options;
+        options.glsl_version = row.version;
+        const rtc::FrontendResult result = rtc::compile_glsl({std::nullopt, row.file, row.text}, options);
+        EXPECT_FALSE(result.ok) << row.id;
+        ASSERT_FALSE(result.diagnostics.empty()) << row.id;
+        const rtc::Diagnostic& first = result.diagnostics.front();
+        EXPECT_EQ(first.id, row.id);
+        EXPECT_EQ(first.line, row.line) << row.id;
+        EXPECT_NE(first.text.find(row.says), std::string::npos) << first.text;
+    }
 }
 
 }  // namespace
