@@ -21,6 +21,8 @@ static VkDeviceSize range_words(uint32_t geometries) { return RTR_RANGE_WORDS * 
 void rtr_build_scratch(uint32_t n, uint32_t geometries, RtrScratchLayout* l) {
     /* The scans of the numbering need two words for blocks of the same size. */
     VkDeviceSize sums = (VkDeviceSize)rtr_groups(n, RTR_SORT_BLOCK) * RTR_SORT_BINS;
+    /* A histogram for each pass of the fused sort. */
+    if (n > RTR_SORT_SMALL && n <= RTR_SORT_FUSED) sums *= 32 / RTR_SORT_BITS;
     memset(l, 0, sizeof *l);
     l->ranges = (uint32_t)(RTR_ST_SUMS + sums);
     place(l, RTR_ARR_STATE, 4 * (l->ranges + range_words(geometries)));

@@ -33,7 +33,7 @@ typedef struct RtrBuild {
     uint32_t node_window, slot_window; /* nodes, slots one binding reaches */
     VkDescriptorSet arrays, whole;     /* bound last; the one without windows */
     /* How far it is recorded. */
-    uint32_t phase, window;
+    uint32_t phase, window, level;
     RtrInputCursor cursor;
     bool dispatched; /* in this phase */
     bool done;
@@ -83,6 +83,9 @@ typedef struct RtrBinding {
 VkResult rtr_bind_sets(RtrRecorder recorder, RtrHeap heap, const RtrBinding* bindings, uint32_t count);
 void rtr_dispatch_kernel(RtrRecorder recorder, RtrKernel kernel, const struct RtrBuildPush* push,
                          uint32_t groups);
+/* The groups are in a buffer. */
+void rtr_dispatch_kernel_indirect(RtrRecorder recorder, RtrKernel kernel, const struct RtrBuildPush* push,
+                                  VkBuffer buffer, VkDeviceSize offset);
 
 /* With validation: fills MARKS with which instance references are good. The bytes of scratch
  * from LEAF_BOX up to `end` are used meanwhile. */

@@ -135,20 +135,67 @@ static VkResult sort(RtrBuild* b) {
     static const RtrKernel kernels[3] = {RTR_KERNEL_sort_count, RTR_KERNEL_sort_scan, RTR_KERNEL_sort_scatter};
     const uint32_t step = b->phase++ - SORT;
     b->push.blocks = rtr_groups(b->primitives, RTR_SORT_BLOCK);
+    if (b->primitives <= RTR_SORT_FUSED) {
+        b->push.step = step * RTR_SORT_BITS;
+        if (step == 32 / RTR_SORT_BITS - 1) b->phase = TOPOLOGY;
+        return rtr_dispatch_whole(b, RTR_KERNEL_sort_fused, b->push.blocks);
+    }
     b->push.step = step / 3 * RTR_SORT_BITS;
     return rtr_dispatch_whole(b, kernels[step % 3], step % 3 == 1 ? 1 : b->push.blocks);
 }
 
+/* Levels that are worth a dispatch each; the nodes above are few. */
+static uint32_t fit_levels(const RtrBuild* b) {
+    uint32_t levels = 0;
+    if (!b->device->level_nodes) return 0;
+    while (levels < RTR_FIT_LEVELS - 2 && b->primitives >> levels > b->device->level_nodes) levels++;
+    return levels;
+}
+
+/* One dispatch of a fitting pass: all of it, or one level. */
+static VkResult fit_pass(RtrBuild* b, uint32_t pass) {
+    const uint32_t groups = rtr_groups(b->primitives, RTR_GROUP), levels = fit_levels(b), level = b->level++;
+    const uint32_t half = (b->primitives + 1) / 2;
+    VkResult r = use_arrays(b);
+    b->push.flags &= ~(RTR_FIT_LISTED | RTR_FIT_KEPT);
+    if (pass > 0 && pass < ROTATION_PASSES) b->push.flags |= RTR_FIT_KEPT;
+    if (r != VK_SUCCESS) return r;
+    if (level == levels) {
+        b->level = 0;
+        b->phase++;
+    }
+    if (!levels) {
+        rtr_dispatch(b, RTR_KERNEL_lbvh_fit, groups);
+        return VK_SUCCESS;
+    }
+    b->push.first = RTR_ST_LEVELS + RTR_LEVEL_WORDS * (RTR_FIT_LEVELS * pass + level);
+    b->push.window_first = level % 2 * half;
+    b->push.window_count = half - b->push.window_first;
+    if (level == 0) {
+        rtr_dispatch(b, RTR_KERNEL_lbvh_fit_first, groups);
+        return VK_SUCCESS;
+    }
+    if (level == levels) b->push.flags |= RTR_FIT_LISTED;
+    rtr_dispatch_kernel_indirect(b->recorder, level == levels ? RTR_KERNEL_lbvh_fit : RTR_KERNEL_lbvh_fit_level, &b->push,
+                                 b->scratch, b->scratch_offset + b->layout.offset[RTR_ARR_STATE] + 4 * b->push.first);
+    b->dispatched = true;
+    return VK_SUCCESS;
+}
+
 /* PREFER_FAST_BUILD takes the Morton tree as it is. */
 static VkResult fit(RtrBuild* b) {
-    const uint32_t step = b->phase++ - TOPOLOGY, groups = rtr_groups(b->primitives, RTR_GROUP);
+    const uint32_t step = b->phase - TOPOLOGY, groups = rtr_groups(b->primitives, RTR_GROUP);
     const uint32_t passes = rotation_passes(b), once = passes ? passes : 1; /* boxes need one */
-    if (step < TOO_DEEP - TOPOLOGY ? step > once : !passes) return VK_SUCCESS;
+    if (step < TOO_DEEP - TOPOLOGY ? step > once : !passes) {
+        b->phase++;
+        return VK_SUCCESS;
+    }
     b->push.step = 0;
     if (step > 0 && step < TOO_DEEP - TOPOLOGY) b->push.step = passes > 0;
     if (step >= TOO_DEEP - TOPOLOGY) b->push.step = 2;
-    return rtr_dispatch_whole(
-        b, step == 0 || step == TOO_DEEP - TOPOLOGY ? RTR_KERNEL_lbvh_topology : RTR_KERNEL_lbvh_fit, groups);
+    if (step != 0 && step != TOO_DEEP - TOPOLOGY) return fit_pass(b, step < TOO_DEEP - TOPOLOGY ? step - 1 : ROTATION_PASSES);
+    b->phase++;
+    return rtr_dispatch_whole(b, RTR_KERNEL_lbvh_topology, groups);
 }
 
 static VkResult number(RtrBuild* b) {
@@ -213,6 +260,7 @@ VkResult rtr_record_build_phase(RtrBuild* b) {
     }
     if (b->phase == MORTON) {
         b->phase++;
+        b->push.blocks = rtr_groups(b->primitives, RTR_SORT_BLOCK);
         return rtr_dispatch_whole(b, RTR_KERNEL_morton, rtr_groups(b->primitives, RTR_GROUP));
     }
     if (b->phase < TOPOLOGY) return sort(b);

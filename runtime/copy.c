@@ -40,6 +40,14 @@ void rtr_dispatch_kernel(RtrRecorder rec, RtrKernel kernel, const struct RtrBuil
                       rtr_groups(groups, RTC_MAX_GROUPS_X), 1);
 }
 
+void rtr_dispatch_kernel_indirect(RtrRecorder rec, RtrKernel kernel, const struct RtrBuildPush* push, VkBuffer buffer,
+                                  VkDeviceSize offset) {
+    RtrDevice d = rec->device;
+    d->vk.CmdBindPipeline(rec->cmd, VK_PIPELINE_BIND_POINT_COMPUTE, d->kernels[kernel]);
+    d->vk.CmdPushConstants(rec->cmd, d->kernel_layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof *push, push);
+    d->vk.CmdDispatchIndirect(rec->cmd, buffer, offset);
+}
+
 VkResult rtrCmdCopyAccelerationStructure(RtrRecorder rec, RtrAccelerationStructure dst,
                                          RtrAccelerationStructure src,
                                          VkCopyAccelerationStructureModeNV mode) {

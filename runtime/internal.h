@@ -81,9 +81,12 @@ RtrGetBufferDeviceAddress rtr_load_buffer_device_address(const RtrInstanceTable*
     X(sort_count)       \
     X(sort_scan)        \
     X(sort_scatter)     \
+    X(sort_fused)       \
     X(sort_small)       \
     X(lbvh_topology)    \
     X(lbvh_fit)         \
+    X(lbvh_fit_first)   \
+    X(lbvh_fit_level)   \
     X(number_count)     \
     X(number_scan)      \
     X(number)           \
@@ -154,6 +157,7 @@ struct RtrDevice_T {
     VkDescriptorSetLayout array_layout; /* set 1 */
     VkDescriptorSetLayout empty_layout;
     VkPipelineLayout kernel_layout;
+    uint32_t level_nodes; /* levels of this many nodes are fitted in a dispatch each (build_phases.c); 0: none */
     bool validation;
     /* With validation: the bottom levels that are bound and not destroyed. */
     atomic_flag live_lock;

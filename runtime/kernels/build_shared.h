@@ -21,8 +21,8 @@
 
 #define RTR_ARR_STATE 0u    /* RTR_ST_* words, then block sums and histograms */
 #define RTR_ARR_LEAF_BOX 1u /* by primitive: min.xyz, active (0/1 as float); max.xyz, 0 */
-#define RTR_ARR_NODE_BOX 2u /* by inner node: min.xyz, SAH cost; max.xyz, height | encoded height << 8 */
-#define RTR_ARR_INFO 3u     /* by inner node: left, right, first slot, primitives | collapsed << 31 */
+#define RTR_ARR_NODE_BOX 2u /* by inner node: min.xyz, SAH cost; max.xyz, height | encoded height << 8 | primitives << 16 */
+#define RTR_ARR_INFO 3u     /* by inner node: left, right, first slot, primitives (255: or more, once fitted) | collapsed << 31 */
 #define RTR_ARR_PAIRS_A 4u  /* (Morton code, primitive), sorted after the sort */
 #define RTR_ARR_PAIRS_B 5u
 #define RTR_ARR_LINKS 6u    /* parents: of inner nodes, then of leaves by sorted position */
@@ -39,6 +39,7 @@
 #define RTR_COLLAPSED 0x80000000u
 #define RTR_HEIGHT_MASK 0xffu
 #define RTR_ENCODED_SHIFT 8u
+#define RTR_COUNT_SHIFT 16u /* primitives, 255: or more */
 #define RTR_HEIGHT_FREE 44u /* rotations may make nodes this high, in inner nodes */
 
 /* State words. Floats that are reduced with atomics are order-preserving uints. */
@@ -54,13 +55,19 @@
 #define RTR_ST_BAD_INSTANCE 13u /* first instance whose reference leads to no structure; ~0: none */
 #define RTR_ST_BAD_UPDATE 14u /* first primitive that an update made active or inactive; ~0: none */
 #define RTR_ST_OFFENDERS 16u /* 12: words of RTC_HDR_OFFENDERS */
-#define RTR_ST_SUMS 64u  /* block sums and histograms start here */
+/* Levels of fitting passes (kernels/fit_list.glsl), RTR_FIT_LEVELS a pass. */
+#define RTR_ST_LEVELS 64u
+#define RTR_LEVEL_WORDS 4u
+#define RTR_FIT_LEVELS 16u
+#define RTR_FIT_PASSES 4u
+#define RTR_ST_SUMS (RTR_ST_LEVELS + RTR_FIT_PASSES * RTR_FIT_LEVELS * RTR_LEVEL_WORDS) /* block sums and histograms start here */
 
 #define RTR_SORT_ITEMS 8u
 #define RTR_SORT_BLOCK (RTR_GROUP * RTR_SORT_ITEMS)
 #define RTR_SORT_BITS 4u
 #define RTR_SORT_BINS 16u
 #define RTR_SORT_SMALL 4096u /* primitives that one workgroup sorts */
+#define RTR_SORT_FUSED (64u * RTR_SORT_BLOCK) /* primitives up to which a dispatch a digit sorts (sort_fused.comp) */
 #define RTR_SCAN_ITEMS 8u
 #define RTR_SCAN_BLOCK (RTR_GROUP * RTR_SCAN_ITEMS)
 
@@ -86,6 +93,8 @@
 #define RTR_BUILD_HAS_TRANSFORM 16u
 #define RTR_BUILD_UPDATE 64u
 #define RTR_BUILD_COUNTED 128u /* an update that counted the active primitives */
+#define RTR_FIT_LISTED 256u /* lbvh_fit starts at a list of nodes */
+#define RTR_FIT_KEPT 512u   /* a pass before has finished all nodes */
 #define RTR_BUILD_CHECKED 32u /* check_instances left in MARKS whether a reference is good */
 
 struct RtrBuildPush {

@@ -2,31 +2,38 @@
 struct Subtree {
     vec3 lo, hi;
     float cost;     // SAH cost, not divided by the root's area
-    uint count;     // primitives
+    uint count;     // primitives; 255: or more
     uint encoded;   // height in encoded nodes: a collapsed subtree has 0
     uint height;    // height in inner nodes
     bool collapsed; // one leaf is cheaper than its nodes
 };
 
+Subtree load_leaf(uint child) {
+    Subtree t;
+    uint prim = child & ~RTR_CHILD_LEAF;
+    t.lo = leaf_box[2u * prim].xyz;
+    t.hi = leaf_box[2u * prim + 1u].xyz;
+    t.cost = half_area(t.lo, t.hi) * RTR_COST_SLOT;
+    t.count = 1u;
+    t.encoded = 0u;
+    t.height = 0u;
+    t.collapsed = false;
+    return t;
+}
+
 Subtree load_subtree(uint child) {
     Subtree t;
-    t.collapsed = false;
     if ((child & RTR_CHILD_LEAF) != 0u) {
-        uint prim = child & ~RTR_CHILD_LEAF;
-        t.lo = leaf_box[2u * prim].xyz;
-        t.hi = leaf_box[2u * prim + 1u].xyz;
-        t.cost = half_area(t.lo, t.hi) * RTR_COST_SLOT;
-        t.count = 1u;
-        t.encoded = 0u;
-        t.height = 0u;
+        t = load_leaf(child);
     } else {
+        t.collapsed = false;
         vec4 a = node_box[2u * child];
         vec4 b = node_box[2u * child + 1u];
         uint misc = floatBitsToUint(b.w);
         t.lo = a.xyz;
         t.hi = b.xyz;
         t.cost = a.w;
-        t.count = info[child].w & ~RTR_COLLAPSED;
+        t.count = misc >> RTR_COUNT_SHIFT;
         t.encoded = (misc >> RTR_ENCODED_SHIFT) & RTR_HEIGHT_MASK;
         t.height = misc & RTR_HEIGHT_MASK;
     }
@@ -37,7 +44,7 @@ Subtree join(Subtree a, Subtree b, bool may_collapse) {
     Subtree t;
     t.lo = min(a.lo, b.lo);
     t.hi = max(a.hi, b.hi);
-    t.count = a.count + b.count;
+    t.count = min(a.count + b.count, 255u);
     float area = half_area(t.lo, t.hi);
     float split_cost = min(area * RTR_COST_NODE + (a.cost + b.cost), RTR_FLT_MAX);
     float leaf_cost = min(area * RTR_COST_SLOT * float(t.count), RTR_FLT_MAX);
@@ -51,7 +58,8 @@ Subtree join(Subtree a, Subtree b, bool may_collapse) {
 
 void store_subtree(uint node, uint left, uint right, Subtree t) {
     node_box[2u * node] = vec4(t.lo, t.cost);
-    node_box[2u * node + 1u] = vec4(t.hi, uintBitsToFloat(t.height | (t.encoded << RTR_ENCODED_SHIFT)));
+    uint misc = t.height | (t.encoded << RTR_ENCODED_SHIFT) | (t.count << RTR_COUNT_SHIFT);
+    node_box[2u * node + 1u] = vec4(t.hi, uintBitsToFloat(misc));
     info[node] = uvec4(left, right, 0u, t.count | (t.collapsed ? RTR_COLLAPSED : 0u));
 }
 
