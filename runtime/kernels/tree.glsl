@@ -46,8 +46,8 @@ Subtree join(Subtree a, Subtree b, bool may_collapse) {
     t.hi = max(a.hi, b.hi);
     t.count = min(a.count + b.count, 255u);
     float area = half_area(t.lo, t.hi);
-    float split_cost = min(area * RTR_COST_NODE + (a.cost + b.cost), RTR_FLT_MAX);
-    float leaf_cost = min(area * RTR_COST_SLOT * float(t.count), RTR_FLT_MAX);
+    precise float split_cost = min(area * RTR_COST_NODE + (a.cost + b.cost), RTR_FLT_MAX);
+    precise float leaf_cost = min(area * RTR_COST_SLOT * float(t.count), RTR_FLT_MAX);
     bool collapse = leaf_cost <= split_cost || (p.flags & RTR_BUILD_LOW_MEMORY) != 0u;
     t.collapsed = may_collapse && t.count <= RTC_MAX_LEAF_SLOTS && collapse;
     t.cost = t.collapsed ? leaf_cost : split_cost;

@@ -39,6 +39,7 @@ VKAPI_ATTR VkResult VKAPI_CALL faulty_extensions(VkPhysicalDevice p, const char*
 
 VKAPI_ATTR void VKAPI_CALL faulty_properties(VkPhysicalDevice p, VkPhysicalDeviceProperties2* out) {
     real_properties(p, out);
+    if (current->type != VK_PHYSICAL_DEVICE_TYPE_MAX_ENUM) out->properties.deviceType = current->type;
     if (current->offered) current->offered(out->properties.limits);
     for (auto* s = static_cast<VkBaseOutStructure*>(out->pNext); s; s = s->pNext) {
         // Only the query whose limits the RtrDevice keeps asks for the ids of device and driver.

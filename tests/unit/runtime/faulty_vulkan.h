@@ -19,6 +19,7 @@ class FaultyVulkan {
     std::string missing;  // vkGet…ProcAddr has no such function, "vkCmdFillBuffer", nor KHR's or EXT's
     std::string fails;    // this function returns VK_ERROR_OUT_OF_DEVICE_MEMORY, while set
     bool no_subgroup_operations = false;
+    VkPhysicalDeviceType type = VK_PHYSICAL_DEVICE_TYPE_MAX_ENUM;  // of the device, unless it is this
     bool null_addresses = false;  // buffers have the device address 0
 
     // The device is the test's to destroy; `result` is what creation returned.
