@@ -68,7 +68,8 @@ bool is_banned(const Inst& inst) {
 // parameters and stay as they are.)
 constexpr const char* kCalled[] = {
     "rtc_report_begin",      "rtc_object_to_world",      "rtc_world_to_object",   "rtc_instance_custom_index",
-    "rtc_object_ray_origin", "rtc_object_ray_direction", "rtc_sbt_raygen_word",   "rtc_sbt_miss_word",
+    "rtc_object_ray_origin", "rtc_object_ray_direction", "rtc_hit_positions",     "rtc_sbt_raygen_word",
+    "rtc_sbt_miss_word",
     "rtc_sbt_hit_word",      "rtc_sbt_callable_word",    "rtc_miss_record",       "rtc_hit_record_base",
     "rtc_callable_record",   "rtc_error",                "rtc_scratch_load",      "rtc_scratch_store",
     "rtc_trace_save",        "rtc_trace_restore"};

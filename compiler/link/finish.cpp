@@ -19,6 +19,7 @@ bool is_ray_tracing(spv::Capability capability) {
         case 4472:  // RayQueryKHR
         case 6020:  // RayCullMaskKHR
         case 5341:  // RayTracingMotionBlurNV
+        case 5336:  // RayTracingPositionFetchKHR
             return true;
         default: return false;
     }
@@ -27,7 +28,7 @@ bool is_ray_tracing(spv::Capability capability) {
 bool is_ray_tracing(const std::string& extension) {
     return extension == "SPV_NV_ray_tracing" || extension == "SPV_KHR_ray_tracing" ||
            extension == "SPV_KHR_ray_query" || extension == "SPV_KHR_ray_cull_mask" ||
-           extension == "SPV_NV_ray_tracing_motion_blur";
+           extension == "SPV_KHR_ray_tracing_position_fetch" || extension == "SPV_NV_ray_tracing_motion_blur";
 }
 
 }  // namespace

@@ -132,6 +132,7 @@ class Linker {
         if (!machine_.any_hit) choices[RTC_LINK_ANY_HIT] = 0;
         if (!machine_.aabbs) choices[RTC_LINK_AABBS] = 0;
         const link::Needs scene = link::scene_needs(options_);
+        choices[RTC_LINK_POSITIONS] = std::any_of(modules_.begin(), modules_.end(), lower::fetches_positions);
         choices[RTC_LINK_MIXED] = scene.mixed;
         choices[RTC_LINK_NON_OPAQUE] = scene.non_opaque;
         choices[RTC_LINK_MASKS] = scene.masks;
@@ -145,15 +146,8 @@ class Linker {
     void add_stage(uint32_t index, std::map<uint32_t, uint32_t>& spec_ids) {
         const StageInput& stage_input = input_.stages[index];
         ir::Module& module = modules_[index];
-        // SPIRV-Tools of 2023 would call it an invalid operand.
-        if (module.has_capability(static_cast<spv::Capability>(5336)))  // RayTracingPositionFetchKHR
-            ir::fail("position-fetch", stage_input.file, 0,
-                     "stage '" + stage_input.name +
-                         "' fetches vertex positions of hits (SPV_KHR_ray_tracing_position_fetch), which is not "
-                         "supported yet; read them from your own vertex buffer by gl_PrimitiveID");
         // Also when the result's validation is switched off: the passes rely on valid input.
-        const std::string problem =
-            options_.trust_input ? "" : link::validate(ir::write_module(module, false), 3, true);
+        const std::string problem = options_.trust_input ? "" : link::validate_input(module);
         if (!problem.empty())
             ir::fail("spirv-invalid", stage_input.file, 0,
                      "stage '" + stage_input.name + "' is not valid SPIR-V: " + problem);
@@ -378,10 +372,13 @@ class Linker {
             const uint32_t minor = r.spirv_version >= 0x00010600u ? 3 : r.spirv_version >= 0x00010400u ? 2 : 1;
 #ifdef NDEBUG
             const std::string problem =
-                link::validate(ir::write_module(link::without_traversal(program_.module), false), minor, false);
+                link::validate(ir::write_module(link::without_traversal(program_.module), false), minor);
 #else
-            const std::string problem = link::validate(words, minor, false);
+            const std::string problem = link::validate(words, minor);
 #endif
+            // The stages' own: inputs are validated for the youngest Vulkan, which refuses none.
+            if (problem.rfind("Capability ", 0) == 0)
+                ir::fail("target-capability", "", 0, "the stages declare what the pipeline's target lacks: " + problem);
             if (!problem.empty()) {
                 result_.spirv = words;
                 ir::fail("internal-invalid-module", "", 0,

@@ -15,12 +15,9 @@ spv_target_env environment(uint32_t vulkan_minor) {
     }
 }
 
-}  // namespace
-
-std::string validate(const std::vector<uint32_t>& spirv, uint32_t vulkan_minor, bool input) {
+std::string validate_in(const std::vector<uint32_t>& spirv, spv_target_env environment) {
     std::string message;
-    spvtools::SpirvTools tools(input ? SPV_ENV_VULKAN_1_3
-                                     : vulkan_minor == 1 ? SPV_ENV_VULKAN_1_1 : environment(vulkan_minor));
+    spvtools::SpirvTools tools(environment);
     tools.SetMessageConsumer([&](spv_message_level_t level, const char*, const spv_position_t&, const char* text) {
         if (level <= SPV_MSG_ERROR && message.empty()) message = text;
     });
@@ -34,6 +31,25 @@ std::string validate(const std::vector<uint32_t>& spirv, uint32_t vulkan_minor, 
     options.SetFriendlyNames(true);
     tools.Validate(spirv.data(), spirv.size(), options);
     return message.empty() ? "invalid module" : message;
+}
+
+}  // namespace
+
+std::string validate(const std::vector<uint32_t>& spirv, uint32_t vulkan_minor) {
+    return validate_in(spirv, vulkan_minor == 1 ? SPV_ENV_VULKAN_1_1 : environment(vulkan_minor));
+}
+
+std::string validate_input(const ir::Module& module) {
+    if (!lower::fetches_positions(module)) return validate_in(ir::write_module(module, false), SPV_ENV_VULKAN_1_3);
+    // SPIRV-Tools of 2023 does not know position fetch; an input at a location is the same to its other rules.
+    ir::Module known = module;
+    std::erase(known.capabilities, lower::kPositionFetch);
+    for (Inst& inst : known.decorations)
+        if (lower::decorates_positions(inst)) {
+            inst.ops[1] = static_cast<uint32_t>(spv::Decoration::Location);
+            inst.ops[2] = 0;
+        }
+    return validate_in(ir::write_module(known, false), SPV_ENV_VULKAN_1_3);
 }
 
 bool optimize(std::vector<uint32_t>& spirv, Optimization level, std::string& message) {

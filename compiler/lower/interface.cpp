@@ -275,6 +275,10 @@ class Interface {
                                 " shader",
                             p_);
         };
+        if (kind == kHitPositions) {
+            need(hit_stage && stage_.kind != StageKind::Intersection, "HitTriangleVertexPositions");
+            return snapshot(id, type, [&] { return hit_positions(type, hit); });
+        }
         switch (kind) {
             case BuiltIn::LaunchIdKHR: return alias(id, m_.variable("rtc_launch_id"), type);
             case BuiltIn::LaunchSizeKHR: return alias(id, m_.variable("rtc_launch_size"), type);
@@ -358,6 +362,22 @@ class Interface {
         return {m_.load(e_, "rtc_ray_root"), m_.load(e_, hit + "instance")};
     }
 
+    // SPV_KHR_ray_tracing_position_fetch: the vertices as they lie in the structure, after the geometry's transform.
+    Id hit_positions(Id type, const std::string& hit) {
+        const Id vertex = p_.vector_type(p_.float_type(32), 3);
+        uint64_t count = 0;
+        if (p_.type_op(type) != Op::OpTypeArray || !p_.constant_value(p_.def(type)->ops[1], count) || count != 3 ||
+            p_.element_type(type, 0) != vertex)
+            stage_.fail("position-fetch", {},
+                        "HitTriangleVertexPositionsKHR must be an array of three vectors of three 32-bit floats", p_);
+        std::vector<Id> arguments = instance_arguments(hit);
+        arguments.push_back(m_.load(e_, hit + "slot"));
+        const Id columns = m_.call(e_, "rtc_hit_positions", arguments);
+        std::vector<Id> vertices;
+        for (uint32_t i = 0; i < 3; ++i) vertices.push_back(e_.extract(vertex, columns, {i}));
+        return e_.construct(type, vertices);
+    }
+
     Id as(Id value, Id type) { return e_.from_uint(value, type); }
 
     // The variable's uses become uses of a Private variable set on entry.
@@ -417,6 +437,14 @@ class Interface {
 };
 
 }  // namespace
+
+bool decorates_positions(const Inst& inst) {
+    return inst.op == Op::OpDecorate && inst.ops.size() > 2 &&
+           inst.ops[1] == static_cast<uint32_t>(spv::Decoration::BuiltIn) &&
+           inst.ops[2] == static_cast<uint32_t>(kHitPositions);
+}
+
+bool fetches_positions(const ir::Module& module) { return module.has_capability(kPositionFetch); }
 
 void lower_interface(Program& program, Stage& stage, continuation::Machine& machine) {
     Interface(program, stage, machine).run();

@@ -77,6 +77,13 @@ void inline_calls(Program& program, Stage& stage, const CallKinds& kinds);
 // Private; built-ins become Private variables set on entry or globals of the traversal.
 void lower_interface(Program& program, Stage& stage, continuation::Machine& machine);
 
+// The same, for SPV_KHR_ray_tracing_position_fetch, which is younger than Debian's SPIR-V headers: its capability and
+// built-in; whether an instruction decorates the latter, or a module declares the former.
+constexpr auto kPositionFetch = static_cast<spv::Capability>(5336);  // RayTracingPositionFetchKHR
+constexpr auto kHitPositions = static_cast<spv::BuiltIn>(5335);      // HitTriangleVertexPositionsKHR
+bool decorates_positions(const Inst& inst);
+bool fetches_positions(const ir::Module& module);
+
 // records.cpp: loads from the shader record become word loads from the SBT; where Program::push_words is set,
 // loads of push constants become loads of its words.
 void lower_records(Program& program, Stage& stage, continuation::Machine& machine);

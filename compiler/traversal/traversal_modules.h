@@ -27,6 +27,7 @@ inline constexpr uint32_t RTC_LINK_ANY_HIT = 0x52540100u;    // false: every can
 inline constexpr uint32_t RTC_LINK_AABBS = 0x52540101u;      // false: no leaf holds AABBs
 inline constexpr uint32_t RTC_LINK_TRIANGLES = 0x52540102u;  // false: no leaf holds triangles
 inline constexpr uint32_t RTC_LINK_RESUMABLE = 0x52540103u;  // false: RTC_SPEC_STEP_BUDGET is ignored
+inline constexpr uint32_t RTC_LINK_POSITIONS = 0x52540104u;  // false: no shader reads the vertices of its hit
 
 // What only some scenes need (link/facts.cpp decides); true is the general case.
 inline constexpr uint32_t RTC_LINK_MIXED = 0x52540110u;           // false: all instances hold the same kind

@@ -65,7 +65,8 @@ def expect(cell, at, values, type="u32", rel=0.0, abs=0.0, binding="0.1", native
 
 
 def case(name, stages, expects, section="", scene=None, size=(1, 1, 1), words=64, **more):
-    """stages: {"rgen": source, "rchit": source, "rchit:second": source, ...} in order; {"assembly": FILE} is SPIR-V of cases/."""
+    """stages: {"rgen": source, "rchit": source, "rchit:second": source, ...} in order; {"assembly": FILE} is SPIR-V of cases/,
+    of the "version" given or spv1.3."""
     assert name not in CASES, name
     out = {"name": name, "section": section, "stages": [], "size": list(size)}
     for key, source in stages.items():
@@ -73,7 +74,7 @@ def case(name, stages, expects, section="", scene=None, size=(1, 1, 1), words=64
         entry = {"stage": stage, "name": label or stage}
         if isinstance(source, dict) and "assembly" in source:
             entry.update(source)
-            entry["file"] = name.split("/")[-1] + "." + stage + ".spv"
+            entry["file"] = name.split("/")[-1] + ("-" + label if label else "") + "." + stage + ".spv"
         elif isinstance(source, dict):
             entry.update(source)
             entry["source"] = entry["source"].rstrip("\n").split("\n")
@@ -117,7 +118,8 @@ def write(folder):
         for stage in content["stages"]:
             if "assembly" in stage:
                 assembly = os.path.join(os.path.dirname(os.path.abspath(__file__)), "cases", stage.pop("assembly"))
-                subprocess.run(["spirv-as", "--preserve-numeric-ids", "--target-env", "spv1.3", assembly, "-o",
+                version = stage.pop("version", "spv1.3")
+                subprocess.run(["spirv-as", "--preserve-numeric-ids", "--target-env", version, assembly, "-o",
                                 os.path.join(os.path.dirname(path), stage["file"])], check=True)
         text = json.dumps(content, indent=1) + "\n"
         names.add(os.path.abspath(path))

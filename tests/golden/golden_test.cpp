@@ -80,7 +80,7 @@ TEST_P(Golden, LinksToTheSameValidModuleOnEveryThread) {
     // The linker leaves traversal out of what it validates and optimises; here the whole module is looked at.
     const auto check = [](const LinkResult& result) {
         const uint32_t version = result.reflection.spirv_version;
-        return link::validate(result.spirv, version >= 0x00010600u ? 3 : version >= 0x00010400u ? 2 : 1, false);
+        return link::validate(result.spirv, version >= 0x00010600u ? 3 : version >= 0x00010400u ? 2 : 1);
     };
     EXPECT_EQ(check(first), "");
     golden.options.optimize = Optimization::Performance;

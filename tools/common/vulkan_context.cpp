@@ -275,6 +275,8 @@ Context::Context(const ContextOptions& options) : validation_(std::make_unique<V
 
     CoreFeatures core(physical, properties.apiVersion, options.all_core_features);
     if (options.features) core.append(options.features);
+    for (const ContextOptions::OptionalFeatures& optional : options.optional_features)
+        if (has_extension(optional.extension)) core.append(optional.features);
     features = core.v10.features;
     device_addresses = core.v12.bufferDeviceAddress == VK_TRUE;
 

@@ -22,6 +22,12 @@ struct ContextOptions {
     std::vector<const char*> optional_extensions;  // enabled where present, see Context::has_extension
     // Structures appended to the device's pNext chain (features of the extensions above).
     void* features = nullptr;
+    // Of an optional extension, appended where that is present.
+    struct OptionalFeatures {
+        const char* extension;
+        void* features;
+    };
+    std::vector<OptionalFeatures> optional_features;
     // Enable every core feature (1.0 to 1.3) the device has, so that any shader a user brings runs.
     // Off: none at all, which is what rtc itself needs.
     bool all_core_features = false;

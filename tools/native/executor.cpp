@@ -116,6 +116,8 @@ void Requirements::apply(tools::ContextOptions& options) {
     as_.pNext = &pipeline_;
     pipeline_.pNext = options.features;
     options.features = &as_;
+    options.optional_extensions.push_back("VK_KHR_ray_tracing_position_fetch");
+    options.optional_features.push_back({"VK_KHR_ray_tracing_position_fetch", &position_fetch_});
 }
 
 namespace {

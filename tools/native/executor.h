@@ -39,6 +39,7 @@ struct Geometry {
 struct Bottom {
     std::string name;
     std::vector<Geometry> geometries;
+    std::vector<Geometry> built_from;  // not empty: built of these and then updated in place
     VkBuildAccelerationStructureFlagsKHR flags = VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_TRACE_BIT_KHR;
 };
 
@@ -132,6 +133,12 @@ class Requirements {
     Kind kind_;
     VkPhysicalDeviceAccelerationStructureFeaturesKHR as_{};
     VkPhysicalDeviceRayTracingPipelineFeaturesKHR pipeline_{};
+    // VkPhysicalDeviceRayTracingPositionFetchFeaturesKHR, which is younger than Debian's headers.
+    struct PositionFetch {
+        VkStructureType type = VkStructureType(1000481000);
+        void* next = nullptr;
+        VkBool32 rayTracingPositionFetch = VK_TRUE;
+    } position_fetch_;
 };
 
 std::unique_ptr<Executor> make_khr(const Context& context);

@@ -162,8 +162,10 @@ class KhrExecutor final : public Executor {
         Buffer memory;
     };
 
+    // `before`: the geometries to build of first; the structure is then updated to those of `info`.
     Built build_one(VkAccelerationStructureBuildGeometryInfoKHR& info, const std::vector<uint32_t>& counts,
-                    const std::vector<VkAccelerationStructureBuildRangeInfoKHR>& ranges) {
+                    const std::vector<VkAccelerationStructureBuildRangeInfoKHR>& ranges,
+                    const VkAccelerationStructureGeometryKHR* before = nullptr) {
         VkAccelerationStructureBuildSizesInfoKHR sizes{
             VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_BUILD_SIZES_INFO_KHR};
         f_.build_sizes(context_.device, VK_ACCELERATION_STRUCTURE_BUILD_TYPE_DEVICE_KHR, &info, counts.data(),
@@ -178,15 +180,24 @@ class KhrExecutor final : public Executor {
         create.type = info.type;
         check(f_.create_as(context_.device, &create, nullptr, &built.as), "vkCreateAccelerationStructureKHR");
         VkDeviceSize alignment = std::max(1u, as_properties_.minAccelerationStructureScratchOffsetAlignment);
-        Buffer scratch(context_, sizes.buildScratchSize + alignment,
+        Buffer scratch(context_, std::max(sizes.buildScratchSize, sizes.updateScratchSize) + alignment,
                        VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | kAddress, MemoryKind::Device);
         info.dstAccelerationStructure = built.as;
         info.scratchData.deviceAddress = (scratch.address + alignment - 1) / alignment * alignment;
         const VkAccelerationStructureBuildRangeInfoKHR* range = ranges.data();
-        context_.run([&](VkCommandBuffer commands) {
-            f_.cmd_build(commands, 1, &info, &range);
-            tools::full_barrier(commands);
-        });
+        auto build = [&](const VkAccelerationStructureGeometryKHR* geometries, bool update) {
+            info.pGeometries = geometries;
+            info.mode = update ? VK_BUILD_ACCELERATION_STRUCTURE_MODE_UPDATE_KHR
+                               : VK_BUILD_ACCELERATION_STRUCTURE_MODE_BUILD_KHR;
+            info.srcAccelerationStructure = update ? built.as : VK_NULL_HANDLE;
+            context_.run([&](VkCommandBuffer commands) {
+                f_.cmd_build(commands, 1, &info, &range);
+                tools::full_barrier(commands);
+            });
+        };
+        const VkAccelerationStructureGeometryKHR* const geometries = info.pGeometries;
+        if (before) build(before, false);
+        build(geometries, before != nullptr);
         VkAccelerationStructureDeviceAddressInfoKHR address{
             VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_DEVICE_ADDRESS_INFO_KHR};
         address.accelerationStructure = built.as;
@@ -201,16 +212,15 @@ class KhrExecutor final : public Executor {
         return buffer;
     }
 
-    Built build_bottom(const Bottom& bottom) {
-        std::vector<Buffer> buffers;
+    // What the device builds of; `buffers` keeps it alive.
+    std::vector<VkAccelerationStructureGeometryKHR> geometries_of(const std::vector<Geometry>& list,
+                                                                  std::vector<Buffer>& buffers) {
         std::vector<VkAccelerationStructureGeometryKHR> geometries;
-        std::vector<uint32_t> counts;
-        std::vector<VkAccelerationStructureBuildRangeInfoKHR> ranges;
         auto keep = [&](Buffer buffer) {
             buffers.push_back(std::move(buffer));
             return buffers.back().address;
         };
-        for (const Geometry& geometry : bottom.geometries) {
+        for (const Geometry& geometry : list) {
             VkAccelerationStructureGeometryKHR out{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_GEOMETRY_KHR};
             out.flags = geometry.flags;
             if (geometry.boxes) {
@@ -236,6 +246,17 @@ class KhrExecutor final : public Executor {
                     triangles.transformData.deviceAddress = keep(input(geometry.transform));
             }
             geometries.push_back(out);
+        }
+        return geometries;
+    }
+
+    Built build_bottom(const Bottom& bottom) {
+        std::vector<Buffer> buffers;
+        const auto geometries = geometries_of(bottom.geometries, buffers);
+        const auto before = geometries_of(bottom.built_from, buffers);
+        std::vector<uint32_t> counts;
+        std::vector<VkAccelerationStructureBuildRangeInfoKHR> ranges;
+        for (const Geometry& geometry : bottom.geometries) {
             counts.push_back(geometry.primitive_count());
             ranges.push_back({geometry.primitive_count(), 0, 0, 0});
         }
@@ -245,7 +266,7 @@ class KhrExecutor final : public Executor {
         info.flags = bottom.flags;
         info.geometryCount = uint32_t(geometries.size());
         info.pGeometries = geometries.data();
-        return build_one(info, counts, ranges);
+        return build_one(info, counts, ranges, before.empty() ? nullptr : before.data());
     }
 
     Built build_top(const Top& top) {

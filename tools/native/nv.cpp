@@ -166,7 +166,9 @@ class NvExecutor final : public Executor {
         return out.memoryRequirements;
     }
 
-    Built build_one(const VkAccelerationStructureInfoNV& info, VkBuffer instances) {
+    // `before`: what to build of first; the structure is then updated to `info`.
+    Built build_one(const VkAccelerationStructureInfoNV& info, VkBuffer instances,
+                    const VkAccelerationStructureInfoNV* before = nullptr) {
         VkDevice device = context_.device;
         Built built;
         VkAccelerationStructureCreateInfoNV create{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_CREATE_INFO_NV};
@@ -185,15 +187,23 @@ class NvExecutor final : public Executor {
         bind.accelerationStructure = built.as;
         bind.memory = built.memory;
         check(f_.bind_memory(device, 1, &bind), "vkBindAccelerationStructureMemoryNV");
+        auto scratch_size = [&](VkAccelerationStructureMemoryRequirementsTypeNV type) {
+            return requirements(built.as, type).size;
+        };
         Buffer scratch(
             context_,
-            requirements(built.as, VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_BUILD_SCRATCH_NV).size,
+            std::max(scratch_size(VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_BUILD_SCRATCH_NV),
+                     scratch_size(VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_UPDATE_SCRATCH_NV)),
             VK_BUFFER_USAGE_RAY_TRACING_BIT_NV, MemoryKind::Device);
-        context_.run([&](VkCommandBuffer commands) {
-            f_.cmd_build(commands, &info, instances, 0, VK_FALSE, built.as, VK_NULL_HANDLE, scratch.handle,
-                         0);
-            tools::full_barrier(commands);
-        });
+        auto build = [&](const VkAccelerationStructureInfoNV& from, bool update) {
+            context_.run([&](VkCommandBuffer commands) {
+                f_.cmd_build(commands, &from, instances, 0, update, built.as,
+                             update ? built.as : VK_NULL_HANDLE, scratch.handle, 0);
+                tools::full_barrier(commands);
+            });
+        };
+        if (before) build(*before, false);
+        build(info, before != nullptr);
         check(f_.as_handle(device, built.as, sizeof(built.handle), &built.handle),
               "vkGetAccelerationStructureHandleNV");
         return built;
@@ -214,7 +224,13 @@ class NvExecutor final : public Executor {
         info.flags = bottom.flags;
         info.geometryCount = uint32_t(input.geometries.size());
         info.pGeometries = input.geometries.data();
-        return build_one(info, VK_NULL_HANDLE);
+        if (bottom.built_from.empty()) return build_one(info, VK_NULL_HANDLE);
+        Bottom earlier = bottom;
+        earlier.geometries = bottom.built_from;
+        NvGeometries first(context_, earlier, VK_BUFFER_USAGE_RAY_TRACING_BIT_NV);
+        VkAccelerationStructureInfoNV before = info;
+        before.pGeometries = first.geometries.data();
+        return build_one(info, VK_NULL_HANDLE, &before);
     }
 
     Built build_top(const Top& top) {

@@ -17,7 +17,7 @@ struct CommandLine {
     std::string scene, size, native_kind, device, case_file, push, table, suite, filter, json, save, oracle,
         save_oracle;
     double limit = 0;
-    std::string shard, addressing;
+    std::string shard, addressing, accuracy = "watertight";
     bool compare = false, validate = false, list = false, verbose = false, optimize = false, print = false;
     uint32_t recursion = 0, callable_depth = 0, repeats = 1, budget = 0, rounds = 0, timeout = 120;
     int resumable = -1, fetch = -1;
@@ -214,6 +214,7 @@ int run(const CommandLine& c) {
     rtc.rounds = c.rounds;
     rtc.fetch = c.fetch;
     rtc.addressing = tools::addressing_from_name(c.addressing);
+    rtc.accuracy = c.accuracy;
     rtc.save_module = c.save;
     if (!c.suite.empty()) {
         SuiteOptions suite;
@@ -331,6 +332,8 @@ int main(int argc, char** argv) {
     app.add_option("--addressing", c.addressing,
                    "acceleration structures in a heap or by address (default: as the device recommends)")
         ->check(CLI::IsMember({"heap", "address"}));
+    app.add_option("--accuracy", c.accuracy, "the traversal that is linked (watertight)")
+        ->check(CLI::IsMember({"fast", "watertight", "exact", "exact64"}));
     app.add_option("--fetch", c.fetch, "a heap through 0 texels, 1 a storage buffer");
     app.add_option("--step-budget", c.budget, "loop turns before a lane suspends");
     app.add_option("--rounds", c.rounds, "how often suspended lanes may go on (64)")->check(CLI::Range(1, 16384));

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
+#include <map>
 #include <fstream>
 
 namespace rtc::run {
@@ -105,10 +106,18 @@ class RtcExecutor final : public Executor {
             out.push_back(as);
             memory_size += size_of(as, VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_OBJECT_NV) + 256;
             scratch_size =
-                std::max(scratch_size,
-                         size_of(as, VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_BUILD_SCRATCH_NV));
+                std::max({scratch_size,
+                          size_of(as, VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_BUILD_SCRATCH_NV),
+                          size_of(as, VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_UPDATE_SCRATCH_NV)});
         };
+        std::vector<std::unique_ptr<native::NvGeometries>> earlier;  // of structures that are updated
         for (const native::Bottom& bottom : world.bottoms) {
+            native::Bottom before = bottom;
+            before.geometries = bottom.built_from;
+            earlier.push_back(
+                bottom.built_from.empty()
+                    ? nullptr
+                    : std::make_unique<native::NvGeometries>(context_, before, RTR_INPUT_BUFFER_USAGE));
             inputs.push_back(
                 std::make_unique<native::NvGeometries>(context_, bottom, RTR_INPUT_BUFFER_USAGE));
             VkAccelerationStructureInfoNV info{};
@@ -135,19 +144,26 @@ class RtcExecutor final : public Executor {
         RtrRecorderCreateInfo recorder_info{};
         need(rtrCreateRecorder(device_, &recorder_info, nullptr, &recorder), "rtrCreateRecorder");
         auto one = [&](const VkAccelerationStructureInfoNV& info, RtrAccelerationStructure as,
-                       VkBuffer instances, bool first) {
+                       VkBuffer instances, bool first, bool update = false) {
             context_.run([&](VkCommandBuffer commands) {
                 need(rtrBeginRecorder(recorder, commands), "rtrBeginRecorder");
                 if (first && heap_) need(rtrCmdInitializeHeap(recorder, heap_), "rtrCmdInitializeHeap");
-                need(rtrCmdBuildAccelerationStructure(recorder, &info, instances, 0, VK_FALSE, as, nullptr,
-                                                      scratch.handle, 0),
+                need(rtrCmdBuildAccelerationStructure(recorder, &info, instances, 0, update, as,
+                                                      update ? as : nullptr, scratch.handle, 0),
                      "rtrCmdBuildAccelerationStructure");
                 tools::full_barrier(commands);
             });
             need(rtrRetireRecorder(recorder), "rtrRetireRecorder");
         };
         try {
-            for (size_t i = 0; i < bottoms_.size(); ++i) one(infos[i], bottoms_[i], VK_NULL_HANDLE, i == 0);
+            for (size_t i = 0; i < bottoms_.size(); ++i) {
+                if (earlier[i]) {
+                    VkAccelerationStructureInfoNV info = infos[i];
+                    info.pGeometries = earlier[i]->geometries.data();
+                    one(info, bottoms_[i], VK_NULL_HANDLE, i == 0);
+                }
+                one(infos[i], bottoms_[i], VK_NULL_HANDLE, i == 0 && !earlier[i], earlier[i] != nullptr);
+            }
             for (size_t t = 0; t < tops_.size(); ++t) {
                 std::vector<VkAccelerationStructureInstanceKHR> instances;
                 for (const native::Placement& placement : world.tops[t].instances) {
@@ -351,6 +367,11 @@ class RtcExecutor final : public Executor {
             options, options_.optimize ? RTCC_OPTIMIZATION_PERFORMANCE : RTCC_OPTIMIZATION_NONE);
         bool needed = rtrGetDeviceSupport(device_)->needsResumableModules;
         rtcc_options_set_addressing(options, addresses_ ? RTCC_ADDRESSING_ADDRESS : RTCC_ADDRESSING_HEAP);
+        static const std::map<std::string, rtcc_accuracy> kTiers{{"fast", RTCC_ACCURACY_FAST},
+                                                                 {"watertight", RTCC_ACCURACY_WATERTIGHT},
+                                                                 {"exact", RTCC_ACCURACY_EXACT},
+                                                                 {"exact64", RTCC_ACCURACY_EXACT_FLOAT64}};
+        rtcc_options_set_accuracy(options, kTiers.at(options_.accuracy));
         if (rtcc_options_assume(options, options_.assume.c_str()) != RTCC_STATUS_SUCCESS)
             throw Error("no such assumption: " + options_.assume);
         rtcc_options_set_resumable(options, options_.resumable < 0 ? needed : options_.resumable);

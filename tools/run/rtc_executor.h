@@ -20,6 +20,7 @@ struct RtcOptions {
     uint32_t rounds = 0;       // launches in which suspended lanes go on; 0: 64, the runtime's default
     int fetch = -1;            // 0 texels, 1 storage buffer; -1: as the device recommends
     tools::Addressing addressing = tools::Addressing::Recommended;
+    std::string accuracy = "watertight";  // tier of the traversal
     std::string assume;        // promises about the scene, by name
     std::string save_module;   // writes the linked module there
     bool print_warnings = true;

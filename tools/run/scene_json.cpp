@@ -132,7 +132,7 @@ World parse_scene(const Json& json, const std::string& folder) {
     World world;
     for (const Json& mesh : json.value("meshes", Json::array())) {
         only_keys(mesh,
-                  {"name", "geometries", "file", "flags", "triangles", "vertices", "indices", "boxes",
+                  {"name", "geometries", "built-from", "file", "flags", "triangles", "vertices", "indices", "boxes",
                    "geometry-flags"},
                   "mesh");
         Bottom bottom;
@@ -157,9 +157,15 @@ World parse_scene(const Json& json, const std::string& folder) {
                            {{"fast-trace", VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_TRACE_BIT_KHR},
                             {"fast-build", VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_BUILD_BIT_KHR},
                             {"low-memory", VK_BUILD_ACCELERATION_STRUCTURE_LOW_MEMORY_BIT_KHR},
-                            {"allow-update", VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_KHR}},
+                            {"allow-update", VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_KHR},
+                            {"allow-data-access", 0x800}},  // of VK_KHR_ray_tracing_position_fetch
                            "mesh flags")
                 : bottom.flags;
+        if (mesh.contains("built-from")) {
+            if (!mesh.contains("geometries")) throw Error("'built-from' needs 'geometries'");
+            for (const Json& geometry : mesh["built-from"]) bottom.built_from.push_back(geometry_of(geometry));
+            bottom.flags |= VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_KHR;
+        }
         world.bottoms.push_back(std::move(bottom));
     }
     auto top_of = [&](const std::string& name, const Json& instances) {

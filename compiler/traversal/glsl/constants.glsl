@@ -19,6 +19,7 @@ layout(constant_id = 0x80) const bool RTC_LINK_ANY_HIT = true; // false: every c
 layout(constant_id = 0x81) const bool RTC_LINK_AABBS = true; // false: no leaf holds AABBs
 layout(constant_id = 0x82) const bool RTC_LINK_TRIANGLES = true; // false: no leaf holds triangles
 layout(constant_id = 0x83) const bool RTC_LINK_RESUMABLE = true; // false: the step budget is ignored
+layout(constant_id = 0x84) const bool RTC_LINK_POSITIONS = true; // false: nobody asks for the vertices of a hit
 layout(constant_id = 0x90) const bool RTC_LINK_MIXED = true; // false: all instances hold the same kind
 layout(constant_id = 0x91) const bool RTC_LINK_NON_OPAQUE = true; // false: geometries and instances are opaque
 layout(constant_id = 0x92) const bool RTC_LINK_MASKS = true; // false: every instance mask is 0xff

@@ -17,9 +17,6 @@
 #include "pairs.glsl"
 #include "wide.glsl"
 
-uint rtc_cand_slot; // number of the candidate's vertices in its structure
-uint rtc_hit_slot; // of the committed triangle's; RTC_NONE: an AABB or nothing
-
 // Stage 1. With u = 2^-24 and truncating devices in mind (2u an operation), and
 // m the largest |component| of the three v - o as computed:
 //   fl(v - o):            2u |v - o|

@@ -43,3 +43,18 @@ vec3 rtc_object_ray_direction(RtcBase root, uint instance, vec3 d) {
     return rtc_transform_vector(uintBitsToFloat(rtc_quad(record, 0u)), uintBitsToFloat(rtc_quad(record, 1u)),
                                 uintBitsToFloat(rtc_quad(record, 2u)), d);
 }
+
+// The three vertices in a triangle slot, one a column; of an AABB (RTC_NONE) zeros.
+mat3 rtc_hit_positions(RtcBase root, uint instance, uint slot) {
+    mat3 positions = mat3(vec3(0.0), vec3(0.0), vec3(0.0));
+    if (slot != RTC_NONE) {
+        uvec4 ids = rtc_quad(rtc_instance_record(root, instance), 6u);
+        RtcBase base = rtc_base(ids.x, ids.y);
+        uint slots = rtc_quad(base, RTC_HDR_SLOTS / 4u)[RTC_HDR_SLOTS & 3u];
+        RtcBase at = rtc_advance(base, slots + slot * RTC_TRIANGLE_QUADS);
+        positions[0] = uintBitsToFloat(rtc_quad(at, 0u).xyz);
+        positions[1] = uintBitsToFloat(rtc_quad(at, 1u).xyz);
+        positions[2] = uintBitsToFloat(rtc_quad(at, 2u).xyz);
+    }
+    return positions;
+}

@@ -25,6 +25,8 @@ void main() {
     mat4x3 m = rtc_object_to_world(root, 0u);
     m = rtc_world_to_object(root, 0u);
     sum += rtc_instance_custom_index(root, 0u);
+    mat3 positions = rtc_hit_positions(root, 0u, rtc_hit_slot);
+    m[3] += positions[0];
     vec3 o = rtc_object_ray_origin(root, 0u, m[3]);
     vec3 d = rtc_object_ray_direction(root, 0u, o);
     sum += floatBitsToUint(d.x) + rtc_sbt_raygen_word(0u) + rtc_sbt_miss_word(0u) + rtc_sbt_hit_word(0u) +

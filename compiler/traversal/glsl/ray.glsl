@@ -34,6 +34,11 @@ uint rtc_cand_opaque;
 uint rtc_cand_attr0, rtc_cand_attr1, rtc_cand_attr2, rtc_cand_attr3;
 uint rtc_cand_attr4, rtc_cand_attr5, rtc_cand_attr6, rtc_cand_attr7;
 
+// Where a triangle's vertices lie: number of the slot in its structure; RTC_NONE: an AABB. Kept by tier
+// `exact`, and with RTC_LINK_POSITIONS.
+uint rtc_cand_slot;
+uint rtc_hit_slot;
+
 // Traversal's own state. The first three, with the stack, are all that a
 // suspended ray must keep (save.glsl); the rest follows from them. While a ray
 // walks, registers are what GPUs run out of: hence few words, and values that

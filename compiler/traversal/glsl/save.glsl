@@ -1,6 +1,11 @@
 // A ray that waits: RTC_TRACE_STATE_WORDS words of lane storage, used stack
 // entries last. Only words that are needed are written.
 const uint RTC_TRACE_STATE_HEADER = 32u;
+#ifdef RTC_TIER_EXACT
+#define RTC_KEEPS_SLOT true
+#else
+#define RTC_KEEPS_SLOT RTC_LINK_POSITIONS
+#endif
 
 void rtc_trace_save(uint first_word) {
     uint w = first_word;
@@ -41,9 +46,9 @@ void rtc_trace_save(uint first_word) {
         rtc_scratch_store(w + 28u, rtc_hit_attr6);
         rtc_scratch_store(w + 29u, rtc_hit_attr7);
     }
-#ifdef RTC_TIER_EXACT
-    rtc_scratch_store(w + 31u, rtc_hit_slot);
-#endif
+    if (RTC_KEEPS_SLOT) {
+        rtc_scratch_store(w + 31u, rtc_hit_slot);
+    }
     w += RTC_TRACE_STATE_HEADER;
     for (uint i = 0u; i < rtc_sp(); ++i) {
         rtc_scratch_store(w + i, rtc_stack_get(i));
@@ -92,9 +97,9 @@ void rtc_trace_restore(uint first_word) {
         rtc_hit_attr6 = rtc_scratch_load(w + 28u);
         rtc_hit_attr7 = rtc_scratch_load(w + 29u);
     }
-#ifdef RTC_TIER_EXACT
-    rtc_hit_slot = rtc_scratch_load(w + 31u);
-#endif
+    if (RTC_KEEPS_SLOT) {
+        rtc_hit_slot = rtc_scratch_load(w + 31u);
+    }
     w += RTC_TRACE_STATE_HEADER;
     for (uint i = 0u; i < min(rtc_sp(), RTC_TRAVERSAL_STACK); ++i) {
         rtc_stack_set(i, rtc_scratch_load(w + i));

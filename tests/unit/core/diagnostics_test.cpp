@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "core_test_util.h"
+#include "ir/module.h"
 #include "rtc/abi.h"
 
 namespace rtc::test {
@@ -252,10 +253,58 @@ TEST(Diagnostics, ResourceConflict) {
                  "resource-conflict");
 }
 
-TEST(Diagnostics, PositionFetch) {
+TEST(Diagnostics, TargetCapability) {
     std::vector<uint32_t> words = module_of(tracing_raygen());
-    words.insert(words.begin() + 5, {2u << 16 | 17u, 5336u});  // OpCapability RayTracingPositionFetchKHR
-    expect_error(link({{StageKind::RayGen, words}}), "position-fetch");
+    words.insert(words.begin() + 5, {2u << 16 | 17u, 21u});  // OpCapability AtomicStorage, which is OpenGL's
+    expect_error(link({{StageKind::RayGen, words}}), "target-capability");
+}
+
+// An input that is HitTriangleVertexPositionsKHR (5335), behind RayTracingPositionFetchKHR (5336).
+std::vector<uint32_t> fetching(const char* model, const std::string& type,
+                               const std::string& body = "%v = OpLoad %positions %input\n") {
+    StageText parts = stage(model, type + "%pi = OpTypePointer Input %positions\n%input = OpVariable %pi Input\n", body,
+                            "OpDecorate %input BuiltIn !5335\n");
+    parts.interface = "%input";
+    std::vector<uint32_t> words = module_of(parts);
+    words.insert(words.begin() + 5, {2u << 16 | 17u, 5336u});
+    return words;
+}
+
+TEST(Diagnostics, PositionFetch) {
+    const std::string good = "%n = OpConstant %uint 3\n%positions = OpTypeArray %v3float %n\n";
+    auto linked = [&](StageKind kind, const char* model, const std::string& type) {
+        return link({{StageKind::RayGen, module_of(tracing_raygen())}, {kind, fetching(model, type)}});
+    };
+    EXPECT_TRUE(linked(StageKind::ClosestHit, "ClosestHitNV", good).ok);
+    EXPECT_TRUE(linked(StageKind::AnyHit, "AnyHitNV", good).ok);
+    expect_error(linked(StageKind::Intersection, "IntersectionNV", good), "builtin-stage");
+    expect_error(linked(StageKind::Miss, "MissNV", good), "builtin-stage");
+    const std::string two = "%n = OpConstant %uint 2\n%positions = OpTypeArray %v3float %n\n";
+    const std::string flat = "%vec2 = OpTypeVector %float 2\n%n = OpConstant %uint 3\n%positions = OpTypeArray %vec2 %n\n";
+    for (const std::string& type : {two, flat, std::string("%positions = OpTypeVector %float 2\n")})
+        expect_error(linked(StageKind::ClosestHit, "ClosestHitNV", type), "position-fetch");
+    // What SPIRV-Tools does not know hides nothing else from it.
+    const std::vector<uint32_t> mistyped = fetching("ClosestHitNV", good, "%v = OpLoad %float %input\n");
+    expect_error(link({{StageKind::RayGen, module_of(tracing_raygen())}, {StageKind::ClosestHit, mistyped}}),
+                 "spirv-invalid");
+}
+
+// Keeping where a triangle's vertices lie costs registers: only for who reads them.
+TEST(Diagnostics, PositionsAreKeptOnlyWhereRead) {
+    const std::string good = "%n = OpConstant %uint 3\n%positions = OpTypeArray %v3float %n\n";
+    LinkOptions options;
+    options.debug_info = true;
+    for (bool specialize : {false, true}) {
+        options.specialize = specialize;
+        auto keeps = [&](const std::vector<uint32_t>& closest_hit) {
+            const LinkResult result =
+                link({{StageKind::RayGen, module_of(tracing_raygen())}, {StageKind::ClosestHit, closest_hit}}, options);
+            EXPECT_TRUE(result.ok) << describe(result);
+            return rtc::ir::to_text(result.spirv).find("\"rtc_hit_slot\"") != std::string::npos;
+        };
+        EXPECT_EQ(keeps(fetching("ClosestHitNV", good)), !specialize);  // loaded, but never used
+        EXPECT_FALSE(keeps(module_of(stage("ClosestHitNV"))));
+    }
 }
 
 TEST(Diagnostics, ReservedConflict) {

@@ -31,8 +31,7 @@ void expect_valid(const LinkResult& result) {
     ASSERT_TRUE(result.ok) << describe(result);
     EXPECT_EQ(link::validate(result.spirv, result.reflection.spirv_version >= 0x00010600u   ? 3
                                            : result.reflection.spirv_version >= 0x00010400u ? 2
-                                                                                            : 1,
-                             false),
+                                                                                            : 1),
               "");
 }
 
