@@ -41,7 +41,7 @@ class Linker {
         machine_.entry_count = static_cast<uint32_t>(input_.stages.size());
         machine_.next_state_id = continuation::kFirstEntry + machine_.entry_count;
         // All stages are read before the first is lowered: how deep calls can nest decides about stacks.
-        for (const StageInput& stage : input_.stages) modules_.push_back(ir::read_module(stage.spirv, stage.file));
+        for (const StageInput& stage : input_.stages) read(stage);
         set_depths();
         import_traversal();
         link::prepare_push_constants(program_, modules_, result_.reflection);
@@ -143,14 +143,18 @@ class Linker {
         machine_.import_traversal(*traversal, choices);
     }
 
+    void read(const StageInput& stage) {
+        modules_.push_back(ir::read_module(stage.spirv, stage.file));
+        // Before anything looks into it, and also when the result's validation is switched off: all that follows
+        // relies on valid input.
+        const std::string problem = options_.trust_input ? "" : link::validate_input(modules_.back());
+        if (!problem.empty())
+            ir::fail("spirv-invalid", stage.file, 0, "stage '" + stage.name + "' is not valid SPIR-V: " + problem);
+    }
+
     void add_stage(uint32_t index, std::map<uint32_t, uint32_t>& spec_ids) {
         const StageInput& stage_input = input_.stages[index];
         ir::Module& module = modules_[index];
-        // Also when the result's validation is switched off: the passes rely on valid input.
-        const std::string problem = options_.trust_input ? "" : link::validate_input(module);
-        if (!problem.empty())
-            ir::fail("spirv-invalid", stage_input.file, 0,
-                     "stage '" + stage_input.name + "' is not valid SPIR-V: " + problem);
         const ir::EntryPoint* entry = nullptr;
         for (const ir::EntryPoint& candidate : module.entry_points)
             if (candidate.name == stage_input.entry && candidate.model == execution_model(stage_input.kind))

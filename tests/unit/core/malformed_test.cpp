@@ -397,6 +397,16 @@ TEST(Malformed, LinesEndWithTheirBlockAndWithNoLine) {
     EXPECT_EQ(open.functions[0].blocks[1].insts[0].source.line, 0u) << "a line reached into the next block";
 }
 
+// The linker's fuzzer: push constants are looked at before any stage is lowered, and so must validation be.
+TEST(Malformed, PushConstantsOfNoType) {
+    for (const char* type : {"%pp = OpTypePointer PushConstant %nothing\n",
+                             "%block = OpTypeStruct %nothing\n%pp = OpTypePointer PushConstant %block\n",
+                             "%block = OpTypeArray %uint %nothing\n%pp = OpTypePointer PushConstant %block\n"})
+        expect_rejected(raygen_text(std::string(kPayload) + type + "%pc = OpVariable %pp PushConstant\n", kTrace,
+                                    kPayloadLocation),
+                        type);
+}
+
 TEST(Malformed, PipelineDescriptions) {
     PipelineInput input = pipeline({{StageKind::RayGen, good_raygen()}});
     expect_clear_error(link_pipeline({}, {}), "a pipeline without stages");
