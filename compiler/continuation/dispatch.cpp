@@ -104,12 +104,17 @@ std::vector<Block> traverse_state(Machine& m) {
     Program& p = m.p;
     const Id u32 = p.uint_type();
     Code code(m);
-    code.branch(code.e().load(p.bool_type(), m.fresh), [&] {
+    auto start = [&] {
         Emitter e = code.e();
         e.store(m.fresh, p.constant_bool(false));
         e.store_u32(m.report_return, 0);
         m.call(e, "rtc_trace_begin");
-    });
+    };
+    // A walk that nothing interrupts is never gone on with: said so, none of it is alive in shaders.
+    if (m.any_hit || m.aabbs || m.resumable)
+        code.branch(code.e().load(p.bool_type(), m.fresh), start);
+    else
+        start();
     Emitter step = code.e();
     const Id event = m.call(step, "rtc_trace_step");
     if (m.checks_scene) {
@@ -236,7 +241,8 @@ Function Machine::build_main(const std::vector<Function>& stage_functions) {
     Emitter begin = code.e();
     const Id inside = call(begin, "rtc_launch_begin");
     code.branch(begin.value(Op::OpLogicalNot, p.bool_type(), {inside}), [&] { code.e().effect(Op::OpReturn, {}); });
-    const std::vector<Id> carried = resumable ? carried_variables(stage_functions) : std::vector<Id>{};
+    const bool parks = addresses();  // the form for GPUs
+    const std::vector<Id> carried = resumable || parks ? carried_variables(stage_functions) : std::vector<Id>{};
     auto start = [&] {
         Emitter e = code.e();
         const Id first = call(e, "rtc_sbt_raygen_word", {p.constant_u32(0)});
@@ -421,6 +427,7 @@ Function Machine::build_main(const std::vector<Function>& stage_functions) {
     code.e().effect(Op::OpReturn, {});
 
     main.blocks = std::move(code.blocks);
+    if (parks) park(main, carried);
     std::vector<Inst>& first = main.blocks.front().insts;
     first.insert(first.begin(), variables_.begin(), variables_.end());
     return main;

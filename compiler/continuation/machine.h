@@ -143,6 +143,8 @@ class Machine {
     std::vector<Function> helper_functions;
     // Variables that some state reads before writing: they cross from state to state. (resume.cpp)
     std::vector<Id> carried_variables(const std::vector<Function>& stage_functions) const;
+    // Moves those that are variables of `main`, which build_main has written, into memory. (park.cpp)
+    void park(Function& main, std::vector<Id> wanted);
     // Functions that store and load all of `carried`, the ray and the word stack, in lane storage.
     // They run in main, so they are blocks, ending open. (resume.cpp)
     void emit_transfer(std::vector<Block>& blocks, const std::vector<Id>& carried, Id stack, Id top, bool saving);
