@@ -82,6 +82,7 @@ struct LinkOptions {
     bool validate = true;               // run spirv-val on the result (traversal apart, see link/partial.cpp)
     bool trust_input = false;           // for measurements: the stages are valid, do not run spirv-val on them
     Addressing addressing = Addressing::Heap;
+    bool checked = false;               // traversal follows nothing in memory that it has not checked
     bool resumable = true;              // lanes can suspend (see docs/resumable.md)
     uint32_t max_recursion_depth = 0;   // trace calls nested in trace calls, 1..31; 0: 1, or 31 when hit or miss shaders trace
     uint32_t max_callable_depth = 0;    // 1..31; 0: 31

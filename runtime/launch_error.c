@@ -26,6 +26,27 @@ VkResult rtrDecodeLaunchError(const uint32_t* words, RtrLaunchError* e) {
 
 static const char* const k_regions[4] = {"raygen", "miss", "hit", "callable"};
 
+static void describe_damage(const RtrLaunchError* e, char* text, size_t size) {
+    static const char* const kinds[7][2] = {{"word", ""},
+                                            {"quad", ", which is outside the heap"},
+                                            {"", ""},
+                                            {"node", ", which the structure does not have"},
+                                            {"slot", ", which the structure does not have"},
+                                            {"instance", ", which the top level does not have"},
+                                            {"node or instance", " more often than a tree can be met"}};
+    const uint32_t kind = e->detail[1] >> RTC_BAD_SHIFT, instance = e->detail[1] & RTC_BAD_INSTANCE_MASK;
+    char met[80], where[32];
+    if (kind == RTC_BAD_HEADER)
+        snprintf(met, sizeof met, "a header that cannot be one");
+    else
+        snprintf(met, sizeof met, "%s %u%s", kinds[kind < 7 ? kind : 0][0], e->detail[0], kinds[kind < 7 ? kind : 0][1]);
+    if (instance == RTC_BAD_INSTANCE_MASK)
+        snprintf(where, sizeof where, "the top level");
+    else
+        snprintf(where, sizeof where, "instance %u", instance);
+    snprintf(text, size, "acceleration structure memory is damaged: in %s a ray met %s", where, met);
+}
+
 void rtrFormatLaunchError(const RtrLaunchError* e, char* text, size_t size) {
     char what[384];
     switch (e->code) {
@@ -84,6 +105,9 @@ void rtrFormatLaunchError(const RtrLaunchError* e, char* text, size_t size) {
                      which);
             break;
         }
+        case RTC_LAUNCH_ERROR_BAD_MEMORY:
+            describe_damage(e, what, sizeof what);
+            break;
         case RTC_LAUNCH_ERROR_ABI:
             snprintf(
                 what, sizeof what,

@@ -215,6 +215,13 @@ rtcc_status rtcc_options_set_compat(rtcc_options_t options, rtcc_compat compat) 
     });
 }
 
+rtcc_status rtcc_options_set_checked(rtcc_options_t options, int enable) {
+    return set(options, [&](rtcc_options& o) {
+        o.link.checked = enable != 0;
+        return RTCC_STATUS_SUCCESS;
+    });
+}
+
 rtcc_status rtcc_options_set_resumable(rtcc_options_t options, int enable) {
     return set(options, [&](rtcc_options& o) {
         o.link.resumable = enable != 0;

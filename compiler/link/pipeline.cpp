@@ -121,7 +121,7 @@ class Linker {
 
     void import_traversal() {
         const TraversalModule* traversal =
-            find_traversal_module(accuracy_name(options_.accuracy), machine_.addresses());
+            find_traversal_module(accuracy_name(options_.accuracy), machine_.addresses(), options_.checked);
         // Reports always hand over to the machine: it ends the shader after an accepted first hit.
         kinds_.report_suspends = true;
         kinds_.loops_suspend = machine_.resumable = options_.resumable;
@@ -340,7 +340,7 @@ class Linker {
         link::declare_interface(program_.module);
 
         r.flags = (machine_.resumable ? RTC_MODULE_RESUMABLE : 0) |
-                  (machine_.addresses() ? RTC_MODULE_ADDRESS_MODE : 0);
+                  (machine_.addresses() ? RTC_MODULE_ADDRESS_MODE : 0) | (options_.checked ? RTC_MODULE_CHECKED : 0);
         r.accuracy = options_.accuracy;
         r.state_count = static_cast<uint32_t>(machine_.states.size());
         r.max_recursion_depth = machine_.max_depth;

@@ -36,7 +36,8 @@ constexpr std::array kBindings = {
 static_assert(kBindings.size() == RTC_BINDING_COUNT);
 
 constexpr std::array kFlags = {Named{"resumable", RTC_MODULE_RESUMABLE},
-                               Named{"addressMode", RTC_MODULE_ADDRESS_MODE}};
+                               Named{"addressMode", RTC_MODULE_ADDRESS_MODE},
+                               Named{"checked", RTC_MODULE_CHECKED}};
 
 std::string hex(uint64_t value) {
     char text[24];

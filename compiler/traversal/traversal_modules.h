@@ -12,14 +12,15 @@ namespace rtc {
 struct TraversalModule {
     const char* name;  // tier
     bool addresses;
+    bool checked;
     const uint32_t* words;
     size_t count;
 };
 
 // "watertight" (the default tier), "fast", "exact" or "exact64" (needs Float64); null for a tier that does
 // not exist. `addresses`: the variant that reads acceleration structures by device address (its RtcBase is a
-// uvec2, not a uint).
-const TraversalModule* find_traversal_module(std::string_view tier, bool addresses = false);
+// uvec2, not a uint); `checked` the one that follows nothing it has not checked (glsl/checked.glsl).
+const TraversalModule* find_traversal_module(std::string_view tier, bool addresses = false, bool checked = false);
 
 // Link constants: SpecIds of bool constants that the linker freezes.
 inline constexpr uint32_t RTC_LINK_BASE = 0x52540100u;

@@ -238,6 +238,16 @@
 #define RTC_LAUNCH_ERROR_SBT_RANGE 8u /* validation: an SBT region ends behind its buffer; detail: bytes there */
 #define RTC_LAUNCH_ERROR_BAD_INSTANCE 9u /* validation: detail: instance; detail2: structure of the declared scene, or RTC_ERROR_BUILT */
 #define RTC_LAUNCH_ERROR_BAD_UPDATE 10u /* validation: detail: RTC_HDR_BAD_UPDATE; detail2 as for BAD_INSTANCE */
+#define RTC_LAUNCH_ERROR_BAD_MEMORY 11u /* modules linked --checked: acceleration structure memory is damaged; detail: number read */
+/* DETAIL2 of BAD_MEMORY: what the number is, and the instance the ray was in (its lower bits; all ones: the top level). */
+#define RTC_BAD_SHIFT 28u
+#define RTC_BAD_INSTANCE_MASK 0x0fffffffu
+#define RTC_BAD_ADDRESS 1u /* a quad beyond the heap */
+#define RTC_BAD_HEADER 2u /* an instance (or ~0: the top level) whose structure's header cannot be one */
+#define RTC_BAD_NODE 3u /* a node that the structure does not have */
+#define RTC_BAD_SLOT 4u /* a slot that it does not have */
+#define RTC_BAD_INSTANCE_INDEX 5u /* an instance that the top level does not have */
+#define RTC_BAD_CYCLE 6u /* a node or instance that was visited before: nodes form no tree */
 /* DETAIL2 of errors found in the table before the launch: this bit, the region (0 raygen, 1
  * miss, 2 hit, 3 callable), the record. */
 #define RTC_ERROR_RECORD 0x80000000u
@@ -252,6 +262,7 @@
 #define RTC_MODULE_MAGIC 0x464d5452u /* "RTMF" */
 #define RTC_MODULE_RESUMABLE 1u /* lanes can suspend: needs CONTROL and SCRATCH */
 #define RTC_MODULE_ADDRESS_MODE 2u /* AS memory by device address */
+#define RTC_MODULE_CHECKED 4u /* the traversal checks what it reads (RTC_LAUNCH_ERROR_BAD_MEMORY) */
 
 #if defined(__cplusplus) || defined(__STDC_VERSION__)
 #include <stdint.h>

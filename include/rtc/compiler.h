@@ -226,6 +226,10 @@ RTCC_EXPORT rtcc_status rtcc_options_set_addressing(rtcc_options_t options, rtcc
  * used by their block's name, a missing `;` after a block, a missing `uniform` before opaque types,
  * gl_GlobalInvocationIDNV and gl_hitTNV. Included files are taken as they are. */
 RTCC_EXPORT rtcc_status rtcc_options_set_compat(rtcc_options_t options, rtcc_compat compat);
+/* The checking variant of traversal: what it reads of acceleration structures is checked before it is followed, and
+ * damage sets the launch error RTC_LAUNCH_ERROR_BAD_MEMORY. Slower; for debugging, beside
+ * RtrDeviceCreateInfo::validation. Default 0. */
+RTCC_EXPORT rtcc_status rtcc_options_set_checked(rtcc_options_t options, int enable);
 /* Lanes can suspend and be resumed by a later dispatch. Default 1. */
 RTCC_EXPORT rtcc_status rtcc_options_set_resumable(rtcc_options_t options, int enable);
 /* Promises about every scene that the pipeline will trace, as names separated by commas or

@@ -39,6 +39,7 @@ Options make_options(const JobPipeline& pipeline, const CompileOptions& wanted) 
     require(rtcc_options_set_addressing(
                 options.get(), wanted.addresses ? RTCC_ADDRESSING_ADDRESS : RTCC_ADDRESSING_HEAP),
             "the addressing mode");
+    require(rtcc_options_set_checked(options.get(), wanted.checked), "checked");
     require(rtcc_options_set_resumable(options.get(), wanted.resumable), "resumable");
     require(rtcc_options_set_specialize(options.get(), wanted.specialize), "specialize");
     require(rtcc_options_assume(options.get(), wanted.assume.c_str()), "an assumption");

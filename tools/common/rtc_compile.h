@@ -15,6 +15,7 @@ struct CompileOptions {
     bool debug_info = false;
     // Lanes can suspend; needed on devices that end long loops (RtrPhysicalDeviceSupport).
     bool resumable = true;
+    bool checked = false;    // traversal checks the memory it reads
     bool specialize = true;  // remove what cannot be needed
     std::string assume;      // promises about scenes, as rtc --assume takes them
     rtcc_accuracy accuracy = RTCC_ACCURACY_WATERTIGHT;

@@ -172,6 +172,8 @@ class Parser {
                 out_.version = true;
             else if (name == "--report")
                 out_.report = true;
+            else if (name == "--checked")
+                out_.checked = true;
             else if (name == "--no-validate")
                 out_.validate = false;
             else if (name == "--no-resumable")

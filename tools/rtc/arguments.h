@@ -44,7 +44,7 @@ struct Arguments {
     bool dependency_file = false;  // -MD
     std::string dependency_output, dependency_target;
     bool debug_info = false, suppress_warnings = false, warnings_as_errors = false;
-    bool report = false, validate = true, resumable = true, specialize = true;
+    bool report = false, validate = true, resumable = true, specialize = true, checked = false;
     std::vector<std::string> assume, scene_profiles;
     std::string glsl_version, reflect, dump_after;
     rtcc_optimization optimization = RTCC_OPTIMIZATION_NONE;

@@ -28,6 +28,8 @@ Options:
                     traced and sets the launch error.
   -c                Only compile: each GLSL file to its own SPIR-V stage
                     (FILE.spv), nothing is linked.
+  --checked         Traversal checks what it reads before it follows it: damaged
+                    acceleration structures set the launch error. Slower.
   --compat=gdc2019  Accept spellings of "RTX on Vulkan" (GDC 2019): blocks used
                     by their block's name, missing `uniform`,
                     gl_GlobalInvocationIDNV, gl_hitTNV.

@@ -64,6 +64,7 @@ Options make_options(const Arguments& arguments) {
     rtcc_options_set_addressing(o, arguments.addressing);
     rtcc_options_set_compat(o, arguments.compat);
     rtcc_options_set_resumable(o, arguments.resumable);
+    rtcc_options_set_checked(o, arguments.checked);
     rtcc_options_set_specialize(o, arguments.specialize);
     for (const std::string& list : arguments.assume)
         require(rtcc_options_assume(o, list.c_str()),

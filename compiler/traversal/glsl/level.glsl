@@ -39,8 +39,16 @@ void rtc_level_setup() {
     uint bits = 0u;
     vec3 o = rtc_ray_origin;
     vec3 d = rtc_ray_direction * rtc_t_down();
+#ifdef RTC_CHECKED
+    bool there = top || rtc_check_instance(rtc_trav_instance);
+    rtc_level_visits = root && !top ? 0u : rtc_level_visits;
+#endif
     if (!top) {
+#ifdef RTC_CHECKED
+        RtcBase record = there ? rtc_instance_record(rtc_ray_root, rtc_trav_instance) : rtc_ray_root;
+#else
         RtcBase record = rtc_instance_record(rtc_ray_root, rtc_trav_instance);
+#endif
         uvec4 ids = rtc_quad(record, 6u);
         uint facts = rtc_quad(record, 7u).x;
         base = rtc_base(ids.x, ids.y);
@@ -61,6 +69,18 @@ void rtc_level_setup() {
             enter = enter && largest > 0.0 && rtc_finite(largest);
         }
     }
+#ifdef RTC_CHECKED
+    enter = enter && there;
+    if (enter) {
+        enter = rtc_check_header(base, top ? RTC_AS_KIND_TOP : RTC_AS_KIND_BOTTOM);
+        // The instance's record says how large slots are.
+        enter = enter && (top || ((rtc_quad(base, RTC_HDR_FACTS / 4u)[RTC_HDR_FACTS & 3u] & RTC_FACT_AABBS) != 0u) ==
+                                     ((bits & RTC_LEVEL_AABBS) != 0u));
+        if (!enter) {
+            rtc_bad_memory(RTC_BAD_HEADER, rtc_trav_instance);
+        }
+    }
+#endif
     if (enter) {
         uvec4 header = rtc_quad(base, RTC_HDR_NODES / 4u); // nodes, slots, node count, slot count
         rtc_trav_base = base;
@@ -77,4 +97,5 @@ void rtc_level_setup() {
         rtc_set_floor(0u);
         rtc_trav_cur = RTC_REF_POP;
     }
+    RTC_CHECK(rtc_trav_cur = rtc_bad != 0u ? RTC_REF_DONE : rtc_trav_cur;)
 }

@@ -23,6 +23,10 @@ layout(set = 0, binding = RTC_BINDING_SBT_CALLABLE, std430) readonly buffer RtcS
 layout(set = 0, binding = RTC_BINDING_CONTROL, std430) buffer RtcControl { uint w[]; } rtc_control;
 layout(set = 0, binding = RTC_BINDING_SCRATCH, std430) buffer RtcScratch { uint w[]; } rtc_scratch;
 
+#ifdef RTC_CHECKED
+uint rtc_bad; // 1: this ray met what cannot be (checked.glsl)
+#endif
+
 // Where acceleration structure memory is (abi.h): a base, and quads from it.
 // Heap mode: quads from the start of the heap, which is bound. Address mode
 // (RTC_ADDRESS_MODE): a device address; nothing is bound.
@@ -46,6 +50,21 @@ RtcBase rtc_advance(RtcBase base, uint quads) {
 }
 #else
 #define RtcBase uint
+#ifdef RTC_CHECKED
+void rtc_bad_memory(uint what, uint number);
+uvec4 rtc_quad(RtcBase base, uint index) {
+    uint at = base + index;
+    uvec4 quad = uvec4(0u);
+    if (at < base || at >= rtc_params.q[RTC_PARAM_HEAP_QUADS >> 2u][RTC_PARAM_HEAP_QUADS & 3u]) {
+        rtc_bad_memory(RTC_BAD_ADDRESS, at);
+    } else if (RTC_FETCH == RTC_FETCH_TEXEL) {
+        quad = texelFetch(rtc_heap_texels, int(at));
+    } else {
+        quad = rtc_heap.q[at];
+    }
+    return quad;
+}
+#else
 uvec4 rtc_quad(RtcBase base, uint index) {
     uvec4 quad;
     if (RTC_FETCH == RTC_FETCH_TEXEL) {
@@ -55,6 +74,7 @@ uvec4 rtc_quad(RtcBase base, uint index) {
     }
     return quad;
 }
+#endif
 
 RtcBase rtc_base(uint low, uint high) { return low; }
 bool rtc_is_null(RtcBase base) { return base == 0u; }

@@ -57,6 +57,7 @@ void rtc_trace_save(uint first_word) {
 }
 
 void rtc_trace_restore(uint first_word) {
+    RTC_CHECK(rtc_check_begin();)
     uint w = first_word;
     rtc_trav_cur = rtc_scratch_load(w);
     rtc_trav_word = rtc_scratch_load(w + 1u);

@@ -8,6 +8,7 @@
 #include "sbt.glsl"
 #include "ray.glsl"
 #include "instance.glsl"
+#include "checked.glsl"
 #if defined(RTC_TIER_EXACT)
 #include "exact.glsl"
 #elif defined(RTC_TIER_FAST)

@@ -52,6 +52,7 @@ bool rtc_scene_accepted() {
 
 void rtc_trace_begin() {
     rtc_refused = 0u;
+    RTC_CHECK(rtc_check_begin();)
     rtc_hit_t = rtc_ray_tmax;
     rtc_trav_tmin = 0.0;
     rtc_trav_tmax = 0.0;
@@ -224,6 +225,7 @@ uint rtc_meet_triangle(uint slot, uint primitive, uint flags, float t, float b1,
 }
 
 uint rtc_test_triangle(uint slot) {
+    RTC_CHECK(slot = rtc_checked_slot(slot);)
     RtcBase at = rtc_advance(rtc_trav_base, rtc_trav_slots + slot * RTC_TRIANGLE_QUADS);
     uvec4 q0 = rtc_quad(at, 0u);
     uvec4 q1 = rtc_quad(at, 1u);
@@ -266,6 +268,7 @@ uint rtc_settle_triangle(uint slot) {
 #endif
 
 uint rtc_test_aabb(uint slot) {
+    RTC_CHECK(slot = rtc_checked_slot(slot);)
     uvec4 q0 = rtc_quad(rtc_trav_base, rtc_trav_slots + slot * RTC_AABB_QUADS);
     uvec4 q1 = rtc_quad(rtc_trav_base, rtc_trav_slots + slot * RTC_AABB_QUADS + 1u);
     uint opacity = rtc_opacity(q1.w);
@@ -282,6 +285,7 @@ uint rtc_test_aabb(uint slot) {
 // Both children of the node under the cursor; the nearer becomes the cursor.
 // (mix with a boolean is a select.)
 uint rtc_test_node() {
+    RTC_CHECK(rtc_trav_cur = rtc_checked_node(rtc_trav_cur);)
 #ifdef RTC_ADDRESS_MODE
     uvec4 q0 = RtcNodesAt(rtc_trav_base).q[rtc_trav_cur + RTC_AS_HEADER_QUADS / RTC_NODE_QUADS].q0;
     uvec4 q1 = RtcNodesAt(rtc_trav_base).q[rtc_trav_cur + RTC_AS_HEADER_QUADS / RTC_NODE_QUADS].q1;
@@ -346,6 +350,7 @@ uint rtc_trace_step() {
                     }
                     if (rtc_inner(rtc_trav_cur)) {
                         result = rtc_test_node();
+                        RTC_CHECK(rtc_trav_cur = rtc_bad != 0u ? RTC_REF_DONE : rtc_trav_cur;)
                     }
                     rtc_turns++;
                 } while (RTC_WHILE_WHILE != 0u && result == RTC_STEP_RUNNING && !rtc_budget_spent() &&
@@ -380,6 +385,7 @@ uint rtc_trace_step() {
                             if (result == RTC_STEP_UNDECIDED) {
                                 rtc_trav_cur = here;
                             }
+                            RTC_CHECK(if (rtc_bad != 0u) { rtc_trav_cur = RTC_REF_DONE; result = RTC_STEP_RUNNING; })
                             rtc_turns++;
 #ifdef RTC_TIER_EXACT
                         } while (result == RTC_STEP_RUNNING && rtc_trav_cur < RTC_REF_DONE && !rtc_budget_spent());
@@ -404,6 +410,7 @@ uint rtc_trace_step() {
         result = RTC_STEP_DONE;
     }
     if (result == RTC_STEP_DONE) {
+        RTC_CHECK(if (rtc_bad != 0u) { rtc_hit_instance = RTC_NONE; })
         rtc_hit_finish();
     }
     return result;
