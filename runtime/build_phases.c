@@ -147,7 +147,6 @@ static VkResult sort(RtrBuild* b) {
 /* Levels that are worth a dispatch each; the nodes above are few. */
 static uint32_t fit_levels(const RtrBuild* b) {
     uint32_t levels = 0;
-    if (!b->device->level_nodes) return 0;
     while (levels < RTR_FIT_LEVELS - 2 && b->primitives >> levels > b->device->level_nodes) levels++;
     return levels;
 }

@@ -157,7 +157,7 @@ struct RtrDevice_T {
     VkDescriptorSetLayout array_layout; /* set 1 */
     VkDescriptorSetLayout empty_layout;
     VkPipelineLayout kernel_layout;
-    uint32_t level_nodes; /* levels of this many nodes are fitted in a dispatch each (build_phases.c); 0: none */
+    uint32_t level_nodes; /* levels of this many nodes are fitted in a dispatch each (build_phases.c) */
     bool validation;
     /* With validation: the bottom levels that are bound and not destroyed. */
     atomic_flag live_lock;

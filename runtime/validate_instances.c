@@ -244,6 +244,9 @@ VkResult rtr_check_launch_instances(RtrRecorder r, const RtrLaunchCheck* check) 
                                                                                  : 1 + RTC_AS_KIND_BOTTOM;
         c.push.facts = 1;
         c.push.geometry = t->index;
+        c.push.index_offset = (uint32_t)t->as->base;
+        c.push.index_type = (uint32_t)(t->as->base >> 32);
+        c.push.vertex_count = (uint32_t)rtr_min_size(t->as->size / RTC_QUAD_BYTES, 0xffffffffu);
         c.push.count = c.push.step == 1 + RTC_AS_KIND_TOP ? (uint32_t)most : 1; /* of a bottom level the header */
         if ((result = look_through(&c)) != VK_SUCCESS) return result;
     }

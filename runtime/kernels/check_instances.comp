@@ -11,7 +11,8 @@
 // Before a build (p.step 0) the records are instances, 64 bytes each from p.data_offset of
 // in_data on, and marks tells of each from p.first on whether it is good. Before a launch
 // (p.step 1 + RTC_AS_KIND_*) they are those of a top level, or of a bottom level none, whose header is in_transform, in_data starts
-// p.window_first quads behind its base and ends p.window_count quads later; dst_header is the
+// p.window_first quads behind its base and ends p.window_count quads later (its base is p.index_offset, p.index_type,
+// its size p.vertex_count quads); dst_header is the
 // control block, p.geometry what detail2 is to say, p.facts: look at the header too.
 #include "common.glsl"
 #include "block.glsl"
@@ -27,6 +28,13 @@ void report(uint code, uint detail, uint detail2) {
 
 bool below(uvec2 a, uvec2 b) { return a.y < b.y || (a.y == b.y && a.x < b.x); }
 
+// Whether what a header says of nodes and slots (NODES, SLOTS, NODE_COUNT, SLOT_COUNT) lies in an object of so many
+// quads. A traversal that checks (rtc --checked) takes the header at its word.
+bool fits(uvec4 h, uint slot_quads, uint quads) {
+    return h.x == RTC_AS_HEADER_QUADS && h.y >= h.x && h.y <= quads && h.z <= (h.y - h.x) / RTC_NODE_QUADS &&
+           h.w <= (quads - h.y) / slot_quads;
+}
+
 bool good(uvec2 reference) {
     uint lo = 0u, hi = p.total;
     for (uint turn = 0u; turn < 32u && lo < hi; turn++) {
@@ -38,7 +46,9 @@ bool good(uvec2 reference) {
     // Alive; so what lies there may be read. Was it built?
     uvec4 h0 = block_quad(reference.x, reference.y, 0u);
     if (h0.xy != reference || h0.z != RTC_AS_MAGIC || h0.w != RTC_AS_KIND_BOTTOM) return false;
-    return block_quad(reference.x, reference.y, RTC_HDR_SIZE_QUADS / 4u).w <= in_index[4u * lo + 2u];
+    bool aabbs = (block_quad(reference.x, reference.y, RTC_HDR_FACTS / 4u)[RTC_HDR_FACTS & 3u] & RTC_FACT_AABBS) != 0u;
+    return fits(block_quad(reference.x, reference.y, RTC_HDR_NODES / 4u), aabbs ? RTC_AABB_QUADS : RTC_TRIANGLE_QUADS,
+                in_index[4u * lo + 2u]);
 }
 
 void main() {
@@ -49,8 +59,14 @@ void main() {
         at = ((p.data_offset + range_offset()) >> 2) + i * 16u + 14u;
     } else {
         if (i == 0u && p.facts != 0u) {
+            uvec4 places = uvec4(in_transform[RTC_HDR_NODES], in_transform[RTC_HDR_SLOTS],
+                                 in_transform[RTC_HDR_NODE_COUNT], in_transform[RTC_HDR_SLOT_COUNT]);
+            bool self = in_transform[RTC_HDR_SELF_LO] == p.index_offset && in_transform[RTC_HDR_SELF_HI] == p.index_type;
             if (in_transform[RTC_HDR_MAGIC] != RTC_AS_MAGIC || in_transform[RTC_HDR_KIND] != p.step - 1u)
                 report(RTC_LAUNCH_ERROR_ABI, in_transform[RTC_HDR_MAGIC], p.geometry);
+            else if (p.step == 1u + RTC_AS_KIND_TOP && !(self && fits(places, RTC_INSTANCE_QUADS, p.vertex_count)))
+                report(RTC_LAUNCH_ERROR_BAD_MEMORY, p.geometry,
+                       RTC_BAD_HEADER << RTC_BAD_SHIFT | RTC_BAD_INSTANCE_MASK);
             else if (in_transform[RTC_HDR_BAD_INSTANCE] != 0u)
                 report(RTC_LAUNCH_ERROR_BAD_INSTANCE, in_transform[RTC_HDR_BAD_INSTANCE] - 1u, p.geometry);
             else if (in_transform[RTC_HDR_BAD_UPDATE] != 0u)

@@ -144,11 +144,23 @@ class Bench {
                 return kind == Kind::Khr ? make_khr_subject(*device_.context, input)
                                          : make_nv_subject(*device_.context, input);
             });
-        for (Entry& entry : entries) time(*entry.subject, input.allow_update);
+        auto sample = [&](Entry& entry, bool counts) {
+            BuildRow& row = report_.rows[entry.row];
+            if (!row.error.empty()) return;
+            try {
+                const double seconds = time(*entry.subject, input.allow_update);
+                if (counts) row.times.push_back(seconds);
+            } catch (const std::exception& problem) {
+                row.error = problem.what();
+                row.times.clear();
+                std::fprintf(stderr, "rtc-bench: %s, %s, %s: %s\n", mesh.c_str(), mode, row.by.c_str(),
+                             problem.what());
+            }
+        };
+        for (Entry& entry : entries) sample(entry, false);
         const Clock::time_point start = Clock::now();
         for (int repeat = 0; repeat < options_.repeats; ++repeat) {
-            for (Entry& entry : entries)
-                report_.rows[entry.row].times.push_back(time(*entry.subject, input.allow_update));
+            for (Entry& entry : entries) sample(entry, true);
             if (repeat >= 2 && std::chrono::duration<double>(Clock::now() - start).count() > options_.seconds) break;
         }
         std::fprintf(stderr, "%s %zu %s done\n", mesh.c_str(), report_.rows.back().primitives, mode);
