@@ -128,6 +128,7 @@ TEST_F(Report, Help) {
                                "-MD ",
                                "-MF ",
                                "-MT ",
+                               "--checked ",
                                "--max-callable-depth",
                                "--max-recursion-depth",
                                "-mfmt=",

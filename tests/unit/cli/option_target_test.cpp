@@ -168,6 +168,16 @@ TEST_F(Target, NoResumable) {
     EXPECT_THAT(reflection("--no-resumable")["flags"].dump(), Not(HasSubstr("resumable")));
 }
 
+TEST_F(Target, CheckedTraversalInEveryTier) {
+    EXPECT_THAT(reflection("")["flags"].dump(), Not(HasSubstr("checked")));
+    for (const std::string tier : {"fast", "watertight", "exact", "exact64"})
+        for (const std::string addressing : {"heap", "address"}) {
+            const std::string options = "--checked --accuracy=" + tier + " --addressing=" + addressing;
+            EXPECT_THAT(reflection(options, addressing == "address" ? "ext" : "nv")["flags"].dump(), HasSubstr("checked"));
+            EXPECT_TRUE(is_valid_for(module(options, addressing == "address" ? "ext" : "nv"), "vulkan1.1")) << options;
+        }
+}
+
 TEST_F(Target, NoValidateGivesTheSameModule) { EXPECT_EQ(module("--no-validate"), module("")); }
 
 }  // namespace

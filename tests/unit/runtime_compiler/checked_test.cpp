@@ -25,16 +25,7 @@ class CheckedTest : public StagesTest, public ::testing::WithParamInterface<bool
         info.validation = VK_TRUE;
         ASSERT_EQ(rtrCreateDevice(&info, nullptr, &rtr), VK_SUCCESS);
         device = rtr;
-        auto options = rtcc_options_create();
-        rtcc_options_set_checked(options, 1);
-        rtcc_options_set_addressing(options, GetParam() ? RTCC_ADDRESSING_ADDRESS : RTCC_ADDRESSING_HEAP);
-        const VkResult r = create(options);
-        rtcc_options_release(options);
-        ASSERT_EQ(r, VK_SUCCESS);
-        RtrPipelineInfo pipeline_info;
-        rtrGetPipelineInfo(pipeline, &pipeline_info);
-        ASSERT_TRUE(pipeline_info.moduleFlags & RTC_MODULE_CHECKED);
-
+        make_pipeline(true);
         scene = std::make_unique<Scene>(*vk, rtr, 1 << 17, GetParam());
         std::mt19937 rng(5);
         std::uniform_real_distribution<float> u(0, 1);
@@ -62,6 +53,22 @@ class CheckedTest : public StagesTest, public ::testing::WithParamInterface<bool
         w.descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
         w.pBufferInfo = &buffer;
         vk->UpdateDescriptorSets(vk->device, 1, &w, 0, nullptr);
+        make_table();
+        sound.assign(scene->heap_buffer.as<uint32_t>(), scene->heap_buffer.as<uint32_t>() + scene->heap_buffer.size / 4);
+    }
+    void make_pipeline(bool checked) {
+        rtrDestroyPipeline(rtr, pipeline, nullptr);
+        auto options = rtcc_options_create();
+        rtcc_options_set_checked(options, checked);
+        rtcc_options_set_addressing(options, GetParam() ? RTCC_ADDRESSING_ADDRESS : RTCC_ADDRESSING_HEAP);
+        const VkResult r = create(options);
+        rtcc_options_release(options);
+        ASSERT_EQ(r, VK_SUCCESS);
+        RtrPipelineInfo info;
+        rtrGetPipelineInfo(pipeline, &info);
+        ASSERT_EQ((info.moduleFlags & RTC_MODULE_CHECKED) != 0, checked);
+    }
+    void make_table() {
         RtrSbtRecord raygen{0, 0, nullptr}, miss{1, 0, nullptr}, hit{2, 0, nullptr};
         RtrSbtInfo sbt_info{1, &raygen, 1, &miss, 1, &hit, 0, nullptr};
         ASSERT_EQ(rtrGetSbtLayout(rtr, &sbt_info, &table), VK_SUCCESS);
@@ -69,7 +76,6 @@ class CheckedTest : public StagesTest, public ::testing::WithParamInterface<bool
         ASSERT_EQ(rtrWriteSbt(rtr, pipeline, &sbt_info, &table, sbt.data), VK_SUCCESS);
         scratch_size = rtrGetLaunchScratchSize(rtr, pipeline, kRays, 1, 1, nullptr);
         scratch = scene->upload(nullptr, scratch_size);
-        sound.assign(scene->heap_buffer.as<uint32_t>(), scene->heap_buffer.as<uint32_t>() + scene->heap_buffer.size / 4);
     }
     void TearDown() override {
         scene.reset();
@@ -164,6 +170,16 @@ TEST_P(CheckedTest, DamageIsNamed) {
         EXPECT_NE(std::string(text).find(row.says), std::string::npos) << text;
         restore();
     }
+    ASSERT_EQ(launch_rays().code, RTC_LAUNCH_ERROR_NONE);
+    EXPECT_EQ(memcmp(result.data, hits.data(), 4 * kRays), 0);
+}
+
+TEST_P(CheckedTest, SoundScenesLookTheSame) {
+    ASSERT_EQ(launch_rays().code, RTC_LAUNCH_ERROR_NONE);
+    const std::vector<uint32_t> hits(result.as<uint32_t>(), result.as<uint32_t>() + kRays);
+    make_pipeline(false);
+    make_table();
+    memset(result.data, 0, 4 * kRays);
     ASSERT_EQ(launch_rays().code, RTC_LAUNCH_ERROR_NONE);
     EXPECT_EQ(memcmp(result.data, hits.data(), 4 * kRays), 0);
 }
