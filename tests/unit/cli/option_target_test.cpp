@@ -173,8 +173,10 @@ TEST_F(Target, CheckedTraversalInEveryTier) {
     for (const std::string tier : {"fast", "watertight", "exact", "exact64"})
         for (const std::string addressing : {"heap", "address"}) {
             const std::string options = "--checked --accuracy=" + tier + " --addressing=" + addressing;
-            EXPECT_THAT(reflection(options, addressing == "address" ? "ext" : "nv")["flags"].dump(), HasSubstr("checked"));
-            EXPECT_TRUE(is_valid_for(module(options, addressing == "address" ? "ext" : "nv"), "vulkan1.1")) << options;
+            const char* dialect = addressing == "address" ? "ext" : "nv";
+            EXPECT_THAT(reflection(options, dialect)["flags"].dump(), HasSubstr("checked"));
+            EXPECT_TRUE(is_valid_for(module(options, dialect), addressing == "address" ? "vulkan1.2" : "vulkan1.1"))
+                << options;
         }
 }
 
