@@ -10,12 +10,16 @@
 // geometry, primitive).
 //
 // Three stages, each for what the one before could not decide:
-//   1. floats, with a bound on their error: nearly all tests end here as misses
+//   1. floats, with a bound on their error: nearly all tests end here, as misses or as hits at a t that lies
+//      between two floats
 //   2. pairs of floats, or doubles (RTC_EXACT_FLOAT64): edges, and t to an ulp
 //   3. integers (wide.glsl): exact, hundreds of times slower
+// The loop of the walk runs the first stage alone (exact_walk.glsl).
 #include "padding.glsl"
 #include "pairs.glsl"
 #include "wide.glsl"
+
+float rtc_trav_low; // the exact t of what is committed lies between this and rtc_trav_tmax, or an ulp beside
 
 // Stage 1. With u = 2^-24 and truncating devices in mind (2u an operation), and
 // m the largest |component| of the three v - o as computed:
@@ -26,11 +30,22 @@
 // and |x| <= 2m. An edge c.x b.y - c.y b.x moves by E l + 2 E^2, where l is the
 // sum of the four |coordinates|, and its own three roundings cost at most
 // 4u (|c.x b.y| + |c.y b.x|) <= 4u m l. Together
-//   21u m l + 578u^2 m^2 <= 22u m (l + 28u m).
+//   21u m l + 578u^2 m^2 <= 22u m (l + 28u m);
+// one bound for all three edges takes all six coordinates for l.
 // Products that vanish below 2^-126, flushed or not, cost less than 2^-123.
 const float RTC_EXACT_EDGE = 1.31130219e-6; // 22u
 const float RTC_EXACT_NEAR = 1.66893006e-6; // 28u
 const float RTC_EXACT_FLUSH = 9.4039548e-38; // 2^-123
+// t where all edges have the same sign for certain. Let T bound each edge's error, e be edges and det their
+// sum as computed. Exact weights B = E / sum E lie in 0 .. 1, so from B sum E = E
+//   |B - e / sum e| <= (T + 3T B) / |sum e| <= 4T / |det|, and the quotient's own roundings: 4u + 5u + 2u < 12u.
+// The hit is at the sum of B z over the vertices, z = (v - o).kz: with D the two differences of z, |D| <= 2m,
+//   4T / |det| (|D1| + |D2|) + 12u (4m) + (z, D, products and sums: below 20u m) <= ... + 68u m.
+// 80u leaves room for what the bound itself loses. Over |d.kz|: 5u t more, and RTC_EXACT_TIE's half, 2^-22 t,
+// also lies between t and an ulp beside it. m in 2^-50 .. 2^60 and |d.kz| in 2^-60 .. 2^50 keep the numbers
+// in range: 1 / det above 2^-126, the bound above 2^-118, t below 2^122.
+const float RTC_EXACT_Z = 4.76837158e-6; // 80u
+const float RTC_EXACT_T = 9.5367432e-7; // 2^-20
 
 #ifdef RTC_EXACT_FLOAT64
 // Stage 2 in double: an operation costs 2^-52. Coordinates x = x' d.kz - d.kx z
@@ -44,6 +59,7 @@ double rtc_real_difference(float a, float b) { return double(a) - double(b); }
 double rtc_real_sum(double a, double b) { return a + b; }
 double rtc_real_product(double a, double b) { return a * b; }
 double rtc_real_scaled(double a, float b) { return a * double(b); }
+double rtc_real_shifted(double a, float power) { return a * double(power); }
 double rtc_real_negated(double a) { return -a; }
 double rtc_real_size(double a) { return abs(a); }
 float rtc_real_float(double a) { return float(a); }
@@ -58,6 +74,7 @@ vec2 rtc_real_difference(float a, float b) { return rtc_two_sum(a, -b); }
 vec2 rtc_real_sum(vec2 a, vec2 b) { return rtc_pair_sum(a, b); }
 vec2 rtc_real_product(vec2 a, vec2 b) { return rtc_pair_product(a, b); }
 vec2 rtc_real_scaled(vec2 a, float b) { return rtc_pair_scaled(a, b); }
+vec2 rtc_real_shifted(vec2 a, float power) { return a * power; }
 vec2 rtc_real_negated(vec2 a) { return vec2(-a.x, -a.y); }
 float rtc_real_size(vec2 a) { return abs(a.x); }
 float rtc_real_float(vec2 a) { return a.x; }
@@ -128,15 +145,15 @@ bool rtc_exact_triangle(vec3 v0, vec3 v1, vec3 v2, ivec3 known, out float t, out
     float m_scale = rtc_power(127 - clamp(m_exponent, -60, 60));
     float d_scale = rtc_power(127 - d_exponent);
     float dx = d.x * d_scale, dy = d.y * d_scale, dz = d.z * d_scale;
-    ax = rtc_real_scaled(ax, m_scale);
-    ay = rtc_real_scaled(ay, m_scale);
-    az = rtc_real_scaled(az, m_scale);
-    bx = rtc_real_scaled(bx, m_scale);
-    by = rtc_real_scaled(by, m_scale);
-    bz = rtc_real_scaled(bz, m_scale);
-    cx = rtc_real_scaled(cx, m_scale);
-    cy = rtc_real_scaled(cy, m_scale);
-    cz = rtc_real_scaled(cz, m_scale);
+    ax = rtc_real_shifted(ax, m_scale);
+    ay = rtc_real_shifted(ay, m_scale);
+    az = rtc_real_shifted(az, m_scale);
+    bx = rtc_real_shifted(bx, m_scale);
+    by = rtc_real_shifted(by, m_scale);
+    bz = rtc_real_shifted(bz, m_scale);
+    cx = rtc_real_shifted(cx, m_scale);
+    cy = rtc_real_shifted(cy, m_scale);
+    cz = rtc_real_shifted(cz, m_scale);
     float az_float = rtc_real_float(az);
 
     RTC_REAL x0 = rtc_real_minus(rtc_real_scaled(ax, dz), rtc_real_scaled(az, dx));
@@ -194,12 +211,12 @@ bool rtc_exact_triangle(vec3 v0, vec3 v1, vec3 v2, ivec3 known, out float t, out
 
         // t = n . (v0 - o) / n . d with n = (v1 - v0) x (v2 - v0), whose
         // differences are fresh: their size is the triangle's, not the distance's.
-        RTC_REAL fx = rtc_real_scaled(rtc_real_difference(p1.x, p0.x), m_scale);
-        RTC_REAL fy = rtc_real_scaled(rtc_real_difference(p1.y, p0.y), m_scale);
-        RTC_REAL fz = rtc_real_scaled(rtc_real_difference(p1.z, p0.z), m_scale);
-        RTC_REAL gx = rtc_real_scaled(rtc_real_difference(p2.x, p0.x), m_scale);
-        RTC_REAL gy = rtc_real_scaled(rtc_real_difference(p2.y, p0.y), m_scale);
-        RTC_REAL gz = rtc_real_scaled(rtc_real_difference(p2.z, p0.z), m_scale);
+        RTC_REAL fx = rtc_real_shifted(rtc_real_difference(p1.x, p0.x), m_scale);
+        RTC_REAL fy = rtc_real_shifted(rtc_real_difference(p1.y, p0.y), m_scale);
+        RTC_REAL fz = rtc_real_shifted(rtc_real_difference(p1.z, p0.z), m_scale);
+        RTC_REAL gx = rtc_real_shifted(rtc_real_difference(p2.x, p0.x), m_scale);
+        RTC_REAL gy = rtc_real_shifted(rtc_real_difference(p2.y, p0.y), m_scale);
+        RTC_REAL gz = rtc_real_shifted(rtc_real_difference(p2.z, p0.z), m_scale);
         RTC_REAL nx = rtc_real_minor(fy, gz, fz, gy);
         RTC_REAL ny = rtc_real_minor(fz, gx, fx, gz);
         RTC_REAL nz = rtc_real_minor(fx, gy, fy, gx);
@@ -236,9 +253,12 @@ bool rtc_exact_triangle(vec3 v0, vec3 v1, vec3 v2, ivec3 known, out float t, out
     return hit;
 }
 
-bool rtc_triangle(vec3 v0, vec3 v1, vec3 v2, out float t, out float b1, out float b2, out bool front,
-                  out bool undecided) {
-    undecided = false;
+// Stage 1: RTC_FILTER_*. `front` as rtc_exact_triangle has it. The exact t of a hit lies between low and high.
+const uint RTC_FILTER_MISS = 0u;
+const uint RTC_FILTER_HIT = 1u;
+const uint RTC_FILTER_UNDECIDED = 2u;
+
+uint rtc_filter_triangle(vec3 v0, vec3 v1, vec3 v2, out float low, out float high, out bool front) {
     vec3 a = rtc_axes(v0 - rtc_trav_origin);
     vec3 b = rtc_axes(v1 - rtc_trav_origin);
     vec3 c = rtc_axes(v2 - rtc_trav_origin);
@@ -252,38 +272,33 @@ bool rtc_triangle(vec3 v0, vec3 v1, vec3 v2, out float t, out float b1, out floa
     float e2 = bx * ay - by * ax;
     vec3 sizes = max(max(abs(a), abs(b)), abs(c));
     float m = max(sizes.x, max(sizes.y, sizes.z));
-    float near = RTC_EXACT_NEAR * (0.5 * m);
-    float la = (abs(ax) + abs(ay)) + near, lb = (abs(bx) + abs(by)) + near, lc = (abs(cx) + abs(cy)) + near;
-    float unit = RTC_EXACT_EDGE * m;
-    float t0 = unit * (lb + lc) + RTC_EXACT_FLUSH;
-    float t1 = unit * (la + lc) + RTC_EXACT_FLUSH;
-    float t2 = unit * (la + lb) + RTC_EXACT_FLUSH;
+    float l = ((abs(ax) + abs(ay)) + (abs(bx) + abs(by))) + (abs(cx) + abs(cy));
+    float bound = (RTC_EXACT_EDGE * m) * (l + RTC_EXACT_NEAR * m) + RTC_EXACT_FLUSH;
+    float least = min(e0, min(e1, e2));
+    float most = max(e0, max(e1, e2));
     // Products above 2^126 might be infinite, and so might the shear: then
     // nothing is known.
     float speed = abs(rtc_trav_shear.z);
     bool bounded = m < 4.6116860e18 && speed > 7.5231638e-37 && speed < 1.3292280e36; // 2^62, 2^-120, 2^120
-    bool positive = bounded && (e0 > t0 || e1 > t1 || e2 > t2);
-    bool negative = bounded && (e0 < -t0 || e1 < -t1 || e2 < -t2);
-    bool hit = !(positive && negative);
-    t = 0.0;
-    b1 = 0.0;
-    b2 = 0.0;
+    uint verdict = bounded && most > bound && least < -bound ? RTC_FILTER_MISS : RTC_FILTER_UNDECIDED;
+    low = 0.0;
+    high = 0.0;
     front = false;
-    if (hit) {
-        ivec3 known = ivec3(0);
-        if (bounded) {
-            known.x = e0 > t0 ? 1 : (e0 < -t0 ? -1 : 0);
-            known.y = e1 > t1 ? 1 : (e1 < -t1 ? -1 : 0);
-            known.z = e2 > t2 ? 1 : (e2 < -t2 ? -1 : 0);
-        }
-        // Infinite vertices have no exact answer: missed.
-        vec3 far = max(max(abs(v0), abs(v1)), abs(v2));
-        hit = rtc_finite(far.x) && rtc_finite(far.y) && rtc_finite(far.z);
-        if (hit) {
-            hit = rtc_exact_triangle(v0, v1, v2, known, t, b1, b2, front);
-        }
+    bool ordinary = m > 8.8817842e-16 && m < 1.1529215e18 && speed > 8.6736174e-19 && speed < 1.1258999e15;
+    if (ordinary && (least > bound || most < -bound)) {
+        verdict = RTC_FILTER_HIT;
+        float det = (e0 + e1) + e2;
+        float inverse = 1.0 / det;
+        float dy = b.z - a.z, dz = c.z - a.z;
+        float z = (a.z + (e1 * inverse) * dy) + (e2 * inverse) * dz;
+        float off = (4.0 * bound) * abs(inverse) * (abs(dy) + abs(dz)) + RTC_EXACT_Z * m;
+        float t = z / rtc_trav_shear.z;
+        off = off / speed + RTC_EXACT_T * abs(t);
+        low = t - off;
+        high = t + off;
+        front = (det > 0.0) == (rtc_trav_shear.z > 0.0);
     }
-    return hit;
+    return verdict;
 }
 
 // t of two triangles, or of a triangle and a float, cannot be told apart by
@@ -359,12 +374,12 @@ bool rtc_comes_first(uint instance, uint geometry, uint primitive) {
 
 bool rtc_in_range(float t, uint slot, uint primitive, uint geometry) {
     rtc_cand_slot = slot;
-    bool inside = t > rtc_trav_tmin && t < rtc_trav_tmax;
+    bool before = t < rtc_trav_low * (1.0 - RTC_EXACT_TIE);
     bool near_min = rtc_tied(t, rtc_trav_tmin);
-    bool near_max = rtc_tied(t, rtc_trav_tmax);
-    if (near_min || near_max) {
+    bool near_max = !before && t <= rtc_trav_tmax * (1.0 + RTC_EXACT_TIE);
+    bool inside = (near_min || t > rtc_trav_tmin) && (near_max || before);
+    if (inside && (near_min || near_max)) {
         uint against = rtc_hit_instance != RTC_NONE ? rtc_hit_slot : RTC_NONE;
-        inside = (near_min || t > rtc_trav_tmin) && (near_max || t < rtc_trav_tmax);
         for (uint i = 0u; i < 2u && inside; ++i) {
             bool low = i == 0u;
             if (low ? near_min : near_max) {
@@ -388,4 +403,7 @@ bool rtc_report_in_range(float t) {
     return t >= rtc_ray_tmin && t <= rtc_hit_t && (!tie || wins);
 }
 
-void rtc_accepted() { rtc_hit_slot = rtc_cand_slot; }
+void rtc_accepted() {
+    rtc_hit_slot = rtc_cand_slot;
+    rtc_trav_low = rtc_trav_tmax;
+}

@@ -49,6 +49,9 @@ void rtc_trace_save(uint first_word) {
     if (RTC_KEEPS_SLOT) {
         rtc_scratch_store(w + 31u, rtc_hit_slot);
     }
+#ifdef RTC_TIER_EXACT
+    rtc_scratch_store(w + 2u, floatBitsToUint(rtc_trav_low));
+#endif
     w += RTC_TRACE_STATE_HEADER;
     for (uint i = 0u; i < rtc_sp(); ++i) {
         rtc_scratch_store(w + i, rtc_stack_get(i));
@@ -101,6 +104,9 @@ void rtc_trace_restore(uint first_word) {
     if (RTC_KEEPS_SLOT) {
         rtc_hit_slot = rtc_scratch_load(w + 31u);
     }
+#ifdef RTC_TIER_EXACT
+    rtc_trav_low = uintBitsToFloat(rtc_scratch_load(w + 2u));
+#endif
     w += RTC_TRACE_STATE_HEADER;
     for (uint i = 0u; i < min(rtc_sp(), RTC_TRAVERSAL_STACK); ++i) {
         rtc_stack_set(i, rtc_scratch_load(w + i));

@@ -56,6 +56,10 @@ void rtc_trace_begin() {
     rtc_hit_t = rtc_ray_tmax;
     rtc_trav_tmin = 0.0;
     rtc_trav_tmax = 0.0;
+#ifdef RTC_TIER_EXACT
+    rtc_trav_low = 0.0;
+    rtc_hit_slot = RTC_NONE;
+#endif
     rtc_hit_packed = 0u;
     rtc_hit_instance = RTC_NONE;
     rtc_hit_primitive = 0u;
@@ -94,6 +98,9 @@ void rtc_trace_begin() {
                 rtc_trav_cur = RTC_REF_ENTER;
                 rtc_trav_tmin = max(rtc_ray_tmin, 0.0) * rtc_t_up();
                 rtc_trav_tmax = rtc_ray_tmax * rtc_t_up();
+#ifdef RTC_TIER_EXACT
+                rtc_trav_low = rtc_trav_tmax;
+#endif
             }
         }
     }
@@ -224,6 +231,7 @@ uint rtc_meet_triangle(uint slot, uint primitive, uint flags, float t, float b1,
     return result;
 }
 
+#ifndef RTC_TIER_EXACT
 uint rtc_test_triangle(uint slot) {
     RTC_CHECK(slot = rtc_checked_slot(slot);)
     RtcBase at = rtc_advance(rtc_trav_base, rtc_trav_slots + slot * RTC_TRIANGLE_QUADS);
@@ -265,6 +273,7 @@ uint rtc_settle_triangle(uint slot) {
     }
     return result;
 }
+#endif
 #endif
 
 uint rtc_test_aabb(uint slot) {
@@ -324,6 +333,10 @@ uint rtc_next_slot() {
     rtc_trav_cur = rtc_count(rtc_trav_cur) == 0u ? RTC_REF_POP : rtc_trav_cur;
     return slot;
 }
+
+#ifdef RTC_TIER_EXACT
+#include "exact_walk.glsl"
+#endif
 
 uint rtc_trace_step() {
     uint result = RTC_STEP_RUNNING;
@@ -387,17 +400,17 @@ uint rtc_trace_step() {
                             }
                             RTC_CHECK(if (rtc_bad != 0u) { rtc_trav_cur = RTC_REF_DONE; result = RTC_STEP_RUNNING; })
                             rtc_turns++;
-#ifdef RTC_TIER_EXACT
-                        } while (result == RTC_STEP_RUNNING && rtc_trav_cur < RTC_REF_DONE && !rtc_budget_spent());
-#else
                         } while (result == RTC_STEP_RUNNING && rtc_trav_cur < RTC_REF_DONE);
-#endif
                     }
                 }
             }
         } while (result == RTC_STEP_RUNNING);
-#ifdef RTC_TIER_DEFERS
         // Outside the loop that nearly all time goes to: what this needs is not kept in registers there.
+#if defined(RTC_TIER_EXACT)
+        if (rtc_unsettled(result)) {
+            result = rtc_settle(result);
+        }
+#elif defined(RTC_TIER_DEFERS)
         if (RTC_LINK_TRIANGLES && result == RTC_STEP_UNDECIDED) {
             result = rtc_settle_triangle(rtc_next_slot());
         }
