@@ -1,10 +1,13 @@
 // Tier `exact` against exact arithmetic, over the axes of the laboratory. Small
 // counts: rtc-accuracy agree repeats them with millions.
 #include <cmath>
+#include <fstream>
+#include <iterator>
 
 #include "cases.h"
 #include "lab_fixture.h"
 #include "leaks.h"
+#include "meshes.h"
 #include "oracle.h"
 
 namespace rtc::lab {
@@ -57,18 +60,30 @@ Outcome compare(DeviceTracer& tracer, const ExactCase& c, uint64_t count) {
     return out;
 }
 
-class Exact : public LabTest, public testing::WithParamInterface<Variant> {
+// With intersection shaders t is settled for every hit, without them once a ray: both ways.
+class Exact : public LabTest, public testing::WithParamInterface<std::pair<Variant, bool>> {
   protected:
     void SetUp() override {
-        if (DeviceTracer::needs_float64(GetParam()) && !test_context().features.shaderFloat64)
+        if (DeviceTracer::needs_float64(GetParam().first) && !test_context().features.shaderFloat64)
             GTEST_SKIP() << "the device has no Float64";
     }
 };
-INSTANTIATE_TEST_SUITE_P(Tiers, Exact, testing::Values(Variant::Exact, Variant::Exact64),
-                         [](const auto& info) { return std::string(variant_name(info.param)); });
+INSTANTIATE_TEST_SUITE_P(Tiers, Exact,
+                         testing::Values(std::pair(Variant::Exact, true), std::pair(Variant::Exact, false),
+                                         std::pair(Variant::Exact64, false)),
+                         [](const auto& info) {
+                             return std::string(variant_name(info.param.first)) +
+                                    (info.param.second ? "_with_aabbs" : "_triangles_only");
+                         });
 
 TEST_P(Exact, AgreesWithExactArithmeticOnEveryAxis) {
-    DeviceTracer& tracer = shared_tracer(GetParam());
+    const auto [variant, aabbs] = GetParam();
+    TracerOptions options;
+    options.variant = variant;
+    options.aabbs = options.any_hit = aabbs;
+    options.step_budget = 6000;
+    options.pause = true;
+    DeviceTracer tracer(test_context(), options);
     uint64_t hits = 0, ties = 0, edges = 0;
     for (const std::string& axis : exact_axis_names()) {
         for (const ExactCase& c : exact_cases(axis)) {
@@ -88,6 +103,47 @@ TEST_P(Exact, AgreesWithExactArithmeticOnEveryAxis) {
     EXPECT_GT(hits, 100 * kRays / 4);
     EXPECT_GT(ties, 400u);
     EXPECT_GT(edges, 400u);
+}
+
+// Nothing suspends within a triangle, so lavapipe 22.3 needs a budget that leaves room for its longest decision.
+uint32_t turns_reserved() {
+    std::ifstream file(RTC_TRAVERSAL_GLSL "/traverse.glsl");
+    const std::string text{std::istreambuf_iterator<char>(file), {}};
+    const std::string name = "RTC_TURNS_OF_A_TRIANGLE = ";
+    const size_t at = text.find(name);
+    return at == std::string::npos ? 0 : uint32_t(std::stoul(text.substr(at + name.size())));
+}
+
+TEST(ExactTurns, LongestDecisionFitsWhatIsReserved) {
+    const uint32_t reserved = turns_reserved();
+    ASSERT_GT(reserved, 0u) << "the constant has another name";
+    TracerOptions options;
+    options.variant = Variant::Exact;
+    options.aabbs = options.any_hit = options.resumable = false;
+    DeviceTracer tracer(test_context(), options);
+    Random random(7);
+    uint32_t most = 0;
+    for (int scene = 0; scene < 60; ++scene) {
+        // Coordinates of all magnitudes make long integers; one vertex is met exactly, between tmin and tmax that
+        // are its t's neighbours: zero edges, and two comparisons of t.
+        Triangle triangle;
+        for (Vec3& v : triangle)
+            for (float* x : {&v.x, &v.y, &v.z})
+                *x = std::ldexp(1 + float(random() % 8388608) / 8388608, int(random() % 240) - 120) * (random() & 1 ? 1.0f : -1.0f);
+        tracer.set_scene(build_scene({Blas{{{{triangle}, {}, true}}}}, {{}}));
+        std::vector<Ray> rays;
+        for (const Vec3& v : triangle)
+            for (const float scale : {1.0f, 0.5f, 3.0f}) {
+                Ray ray = make_ray({0, 0, 0}, {v.x * scale, v.y * scale, v.z * scale});
+                ray.tmin = std::nextafter(1 / scale, 0.0f);
+                ray.tmax = std::nextafter(1 / scale, 2.0f);
+                rays.push_back(ray);
+            }
+        for (const RayResult& r : tracer.trace(rays)) most = std::max(most, r.turns);
+    }
+    // The walk to the only leaf takes a few turns of its own.
+    EXPECT_LE(most, reserved + 16);
+    EXPECT_GT(most, 1500u) << "no long decision was met: this test sees nothing";
 }
 
 }  // namespace

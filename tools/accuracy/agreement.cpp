@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "cases.h"
+#include "exact.h"
 
 namespace rtc::lab {
 namespace {
@@ -31,6 +32,10 @@ class Histogram {
         ++steps_[std::min<size_t>(size_t(error * 64), steps_.size() - 1)];
         ++count_;
     }
+    void add(const Histogram& more) {
+        for (size_t i = 0; i < steps_.size(); ++i) steps_[i] += more.steps_[i];
+        count_ += more.count_;
+    }
     double percentile(double p) const {
         uint64_t seen = 0;
         for (size_t i = 0; i < steps_.size(); ++i) {
@@ -53,7 +58,21 @@ bool has_denormal(const Ray& ray) {
     return false;
 }
 
-void compare(const ExactCase& c, const std::vector<Ray>& rays, const std::vector<RayResult>& got,
+// Whether a triangle that only the device hits is touched at an edge or vertex: there a rule decides.
+bool touches_edge(const HostScene& scene, const Ray& ray, const RayResult& hit) {
+    const Instance& instance = scene.instances.at(hit.instance);
+    const auto& geometries = scene.blases.at(instance.blas).geometries;
+    if (hit.geometry >= geometries.size() || hit.primitive >= geometries[hit.geometry].triangles.size()) return false;
+    ExactRay object{ray.origin, ray.direction, ray.tmin, ray.tmax};
+    if (instance.object_to_world != kIdentity) {
+        object.origin = transform_point(scene.world_to_object[hit.instance], ray.origin);
+        object.direction = transform_vector(scene.world_to_object[hit.instance], ray.direction);
+    }
+    mpq_class t;
+    return intersect(object, geometries[hit.geometry].triangles[hit.primitive], &t) == Verdict::Boundary;
+}
+
+void compare(const ExactCase& c, const HostScene& scene, const std::vector<Ray>& rays, const std::vector<RayResult>& got,
              const std::vector<std::optional<OracleHit>>& expected, AgreementRow& row, Histogram& errors) {
     row.rays += rays.size();
     for (size_t i = 0; i < rays.size(); ++i) {
@@ -76,6 +95,12 @@ void compare(const ExactCase& c, const std::vector<Ray>& rays, const std::vector
         row.invented += !e && hit;
         row.inverted += e && hit;
         row.denormal += denormal;
+        const bool rule =
+            !denormal && (e ? e->tied || e->on_edge : g.instance < scene.instances.size() && touches_edge(scene, rays[i], g));
+        row.by_rule += rule;
+        row.missed_plainly += !denormal && !rule && e && !hit;
+        row.invented_plainly += !denormal && !rule && !e && hit;
+        row.later += !denormal && !rule && e && hit && double(g.t) > e->t;
         if (denormal || !row.first.empty()) continue;
         char text[400];
         std::snprintf(text, sizeof text, "%s: o %a %a %a d %a %a %a t %a to %a", c.value.c_str(), rays[i].origin.x,
@@ -86,7 +111,7 @@ void compare(const ExactCase& c, const std::vector<Ray>& rays, const std::vector
 }
 
 // One case; `allowed` seconds at most, roughly.
-void measure_case(DeviceTracer& tracer, const ExactCase& c, uint64_t share, double allowed, unsigned threads,
+void measure_case(RayTracer& tracer, const ExactCase& c, uint64_t share, double allowed, unsigned threads,
                   AgreementRow& row, Histogram& errors) {
     const Clock::time_point start = Clock::now();
     const HostScene scene = build_scene(c.blases, c.instances, c.build);
@@ -112,17 +137,39 @@ void measure_case(DeviceTracer& tracer, const ExactCase& c, uint64_t share, doub
         const Clock::time_point begin = Clock::now();
         const auto expected = first_hits(oracle, rays, &row.oracle, threads);
         row.oracle_seconds += seconds_since(begin);
-        compare(c, rays, tracing.get(), expected, row, errors);
+        compare(c, scene, rays, tracing.get(), expected, row, errors);
         if (seconds_since(start) > allowed) break;
     }
 }
 
 }  // namespace
 
-std::vector<AgreementRow> measure_agreement(DeviceTracer& tracer, const AgreementSettings& settings) {
+void AgreementRow::add(const AgreementRow& more) {
+    cases += more.cases;
+    rays += more.rays;
+    hits += more.hits;
+    ties += more.ties;
+    on_edge += more.on_edge;
+    missed += more.missed;
+    invented += more.invented;
+    inverted += more.inverted;
+    denormal += more.denormal;
+    by_rule += more.by_rule;
+    missed_plainly += more.missed_plainly;
+    invented_plainly += more.invented_plainly;
+    later += more.later;
+    oracle.add(more.oracle);
+    device_seconds += more.device_seconds;
+    oracle_seconds += more.oracle_seconds;
+    t_max = std::max(t_max, more.t_max);
+}
+
+std::vector<AgreementRow> measure_agreement(RayTracer& tracer, const AgreementSettings& settings, AgreementRow* total) {
     const std::vector<std::string>& names = settings.axes.empty() ? exact_axis_names() : settings.axes;
     const Clock::time_point start = Clock::now();
     std::vector<AgreementRow> rows;
+    AgreementRow all{.axis = "all"};
+    Histogram all_errors;
     double said = 0;
     for (size_t n = 0; n < names.size(); ++n) {
         const std::vector<ExactCase> cases = exact_cases(names[n]);
@@ -147,8 +194,14 @@ std::vector<AgreementRow> measure_agreement(DeviceTracer& tracer, const Agreemen
         row.t_p50 = errors.percentile(0.5);
         row.t_p99 = errors.percentile(0.99);
         row.t_p999 = errors.percentile(0.999);
+        all_errors.add(errors);
+        all.add(row);
         rows.push_back(row);
     }
+    all.t_p50 = all_errors.percentile(0.5);
+    all.t_p99 = all_errors.percentile(0.99);
+    all.t_p999 = all_errors.percentile(0.999);
+    if (total) *total = all;
     return rows;
 }
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "device_tracer.h"
+#include "ray_tracer.h"
 #include "oracle.h"
 
 namespace rtc::lab {
@@ -16,11 +16,15 @@ struct AgreementRow {
     uint64_t missed = 0, invented = 0;  // hit by exact arithmetic only, by the device only
     uint64_t inverted = 0;              // another triangle than the first
     uint64_t denormal = 0;              // of all differences: cases where denormals are at stake, rays that have some
+    uint64_t by_rule = 0;               // of the others: rays that tie or meet an edge exactly, which only a rule decides
+    uint64_t missed_plainly = 0, invented_plainly = 0;  // but for denormals and rules
+    uint64_t later = 0;                 // of `inverted`, but for the two above: the triangle hit lies beyond the first
     uint64_t ties = 0, on_edge = 0;     // rays that only a rule decides
     double t_p50 = 0, t_p99 = 0, t_p999 = 0, t_max = 0;  // ulps, cases without denormals
     std::string first;                                   // the first difference, as hexadecimal floats
     OracleCounts oracle;                                 // what it needed rationals for
     double device_seconds = 0, oracle_seconds = 0;       // wall time; both run at the same time
+    void add(const AgreementRow& more);                  // the counts
     uint64_t different() const { return missed + invented + inverted; }
 };
 
@@ -34,6 +38,8 @@ struct AgreementSettings {
 
 // The tracer should pause (TracerOptions): exact decisions of a whole group can take more turns than
 // lavapipe 22.3 allows a dispatch.
-std::vector<AgreementRow> measure_agreement(DeviceTracer& tracer, const AgreementSettings& settings);
+// `total` receives the sum of all axes, t errors included.
+std::vector<AgreementRow> measure_agreement(RayTracer& tracer, const AgreementSettings& settings,
+                                            AgreementRow* total = nullptr);
 
 }  // namespace rtc::lab

@@ -10,6 +10,9 @@ namespace rtc::lab {
 int leaks_command(int argc, char** argv);
 int spawn_command(int argc, char** argv);
 int agree_command(int argc, char** argv);
+int report_command(int argc, char** argv);
+// Without a command: everything about some subjects on one device.
+int measure_command(int argc, char** argv);
 
 // 95 % bound on a rate of which `events` were seen in `n`: the rule of three when none was, else about two
 // standard deviations up.

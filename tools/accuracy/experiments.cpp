@@ -8,7 +8,6 @@
 
 #include "cases.h"
 #include "error.h"
-#include "exact.h"
 
 namespace rtc::lab {
 namespace {
@@ -86,66 +85,6 @@ std::vector<Placed> points_of(const std::string& axis) {
     return points;
 }
 
-double percentile(const std::vector<double>& sorted, double p) {
-    if (sorted.empty()) return 0;
-    return sorted[std::min(sorted.size() - 1, size_t(p * double(sorted.size())))];
-}
-
-double ulp(double t) {
-    const float f = std::fabs(float(t));
-    return double(std::nextafter(f, std::numeric_limits<float>::infinity())) - double(f);
-}
-
-ExactRow compare(DeviceTracer& tracer, const std::string& name, const IndexedMesh& mesh, const Vec3& centre,
-                 double size, uint64_t count, uint64_t seed) {
-    const std::vector<Triangle> triangles = mesh.soup();
-    tracer.set_scene(build_scene({Blas{{{triangles, {}, true}}}}, {{}}));
-    std::mt19937_64 random(seed);
-    std::uniform_real_distribution<double> unit(-1, 1);
-    std::vector<Ray> rays(count);
-    const float far = std::numeric_limits<float>::max();
-    for (Ray& ray : rays) {
-        Vec3 target, origin;
-        for (int i = 0; i < 3; ++i) {
-            (&origin.x)[i] = float(centre[i] + 3 * size * unit(random));
-            (&target.x)[i] = float(centre[i] + size * unit(random));
-        }
-        ray.origin = origin;
-        ray.direction = {target.x - origin.x, target.y - origin.y, target.z - origin.z};
-        ray.tmax = far;
-    }
-    const auto results = tracer.trace(rays);
-    ExactRow row{.scene = name, .rays = count};
-    std::vector<double> errors;
-    for (uint64_t i = 0; i < count; ++i) {
-        const ExactRay ray{rays[i].origin, rays[i].direction, 0, far};
-        const auto expected = nearest(ray, triangles);
-        const RayResult& got = results[i];
-        const bool hit = got.instance != kNoInstance;
-        row.hits += expected.has_value();
-        if (!expected && !hit) continue;
-        if (expected && hit && expected->triangle == got.primitive) {
-            errors.push_back(std::fabs(double(got.t) - expected->t) / ulp(expected->t));
-            continue;
-        }
-        if (expected && hit && expected->boundary) {
-            ++row.ties;
-            continue;
-        }
-        row.missed += expected && !hit;
-        row.invented += !expected && hit;
-        row.wrong += expected && hit;
-        const double margin = inside_margin(ray, triangles[expected ? expected->triangle : got.primitive]);
-        row.worst_margin = std::max(row.worst_margin, std::fabs(margin));
-    }
-    std::sort(errors.begin(), errors.end());
-    row.t_p50 = percentile(errors, 0.5);
-    row.t_p99 = percentile(errors, 0.99);
-    row.t_p999 = percentile(errors, 0.999);
-    row.t_max = errors.empty() ? 0 : errors.back();
-    return row;
-}
-
 }  // namespace
 
 const std::vector<std::string>& axis_names() {
@@ -154,7 +93,7 @@ const std::vector<std::string>& axis_names() {
     return names;
 }
 
-void measure_axis(DeviceTracer& tracer, const std::string& axis, uint64_t rays, std::vector<LeakRow>& rows) {
+void measure_axis(RayTracer& tracer, const std::string& axis, uint64_t rays, std::vector<LeakRow>& rows) {
     uint64_t seed = 1;
     for (Placed& point : points_of(axis)) {
         point.c.mesh = &point.mesh;
@@ -178,7 +117,7 @@ void measure_axis(DeviceTracer& tracer, const std::string& axis, uint64_t rays, 
     }
 }
 
-void measure_culls(DeviceTracer& tracer, uint64_t rays, std::vector<CullRow>& rows) {
+void measure_culls(RayTracer& tracer, uint64_t rays, std::vector<CullRow>& rows) {
     uint64_t seed = 500;
     auto measure = [&](const std::string& place, const IndexedMesh& mesh, LeakCase c) {
         c.mesh = &mesh;
@@ -217,52 +156,70 @@ void measure_culls(DeviceTracer& tracer, uint64_t rays, std::vector<CullRow>& ro
     }
 }
 
-void measure_exact(DeviceTracer& tracer, uint64_t rays, std::vector<ExactRow>& rows) {
-    const IndexedMesh sphere = make_icosphere(3), knot = make_torus_knot(80, 12);
-    rows.push_back(compare(tracer, "icosphere", sphere, {}, 1, rays, 11));
-    rows.push_back(compare(tracer, "torus knot", knot, {}, 1.5, rays, 12));
-    rows.push_back(
-        compare(tracer, "icosphere + 1e2", moved(sphere, 1, {100, -100, 50}), {100, -100, 50}, 1, rays, 13));
-    rows.push_back(compare(tracer, "icosphere + 1e4", moved(sphere, 1, {1e4, -1e4, 5e3}), {1e4f, -1e4f, 5e3f},
-                           1, rays, 14));
-    rows.push_back(compare(tracer, "slivers 1e-4", make_slivers(256, 1e-4), {}, 0.02, rays, 15));
-}
-
-void measure_cost(DeviceTracer& tracer, uint64_t rays, std::vector<CostRow>& rows) {
-    const IndexedMesh knot = make_torus_knot(2000, 50);
-    tracer.set_scene(build_scene({Blas{{{knot.soup(), {}, true}}}}, {{}}));
+static std::vector<Ray> cost_rays(bool coherent, uint64_t rays) {
     std::mt19937_64 random(3);
     std::uniform_real_distribution<float> unit(-1, 1);
     const uint32_t side = uint32_t(std::sqrt(double(rays)));
+    std::vector<Ray> batch(size_t(side) * side);
+    for (size_t i = 0; i < batch.size(); ++i) {
+        Ray& ray = batch[i];
+        ray.tmax = 1e30f;
+        if (coherent) {
+            // Tiles of 8 x 4, as the launch grid walks pixels.
+            const size_t tile = i / 32, tiles = std::max<size_t>(side / 8, 1);
+            const float x = float((tile % tiles) * 8 + i % 8), y = float((tile / tiles) * 4 + i / 8 % 4);
+            ray.origin = {0, 0, 4};
+            ray.direction = {1.2f * (x / float(side) - 0.5f), 1.2f * (y / float(side) - 0.5f), -1};
+        } else {
+            ray.origin = {1.6f * unit(random), 1.6f * unit(random), 1.6f * unit(random)};
+            ray.direction = {unit(random), unit(random), unit(random)};
+        }
+    }
+    return batch;
+}
+
+static double median(std::vector<double> values) {
+    std::sort(values.begin(), values.end());
+    const size_t half = values.size() / 2;
+    return values.size() % 2 ? values[half] : (values[half - 1] + values[half]) / 2;
+}
+
+void measure_cost(const std::vector<CostSubject>& subjects, uint64_t rays, unsigned repeats) {
+    const IndexedMesh knot = make_torus_knot(2000, 50);
+    const HostScene scene = build_scene({Blas{{{knot.soup(), {}, true}}}}, {{}});
+    for (const CostSubject& subject : subjects) subject.tracer->set_scene(scene);
     for (const bool coherent : {true, false}) {
-        std::vector<Ray> batch(size_t(side) * side);
-        for (size_t i = 0; i < batch.size(); ++i) {
-            Ray& ray = batch[i];
-            ray.tmax = 1e30f;
-            if (coherent) {
-                // Tiles of 8 x 4, as the launch grid walks pixels.
-                const size_t tile = i / 32, tiles = std::max<size_t>(side / 8, 1);
-                const float x = float((tile % tiles) * 8 + i % 8), y = float((tile / tiles) * 4 + i / 8 % 4);
-                ray.origin = {0, 0, 4};
-                ray.direction = {1.2f * (x / float(side) - 0.5f), 1.2f * (y / float(side) - 0.5f), -1};
-            } else {
-                ray.origin = {1.6f * unit(random), 1.6f * unit(random), 1.6f * unit(random)};
-                ray.direction = {unit(random), unit(random), unit(random)};
+        const std::vector<Ray> batch = cost_rays(coherent, rays);
+        std::vector<std::vector<double>> times(subjects.size());
+        std::vector<CostRow> rows(subjects.size());
+        // One after the other, again and again: what else the machine does, and how warm it is, is the same for all.
+        for (unsigned repeat = 0; repeat <= repeats; ++repeat) {
+            for (size_t i = 0; i < subjects.size(); ++i) {
+                const std::clock_t before = std::clock();
+                const auto results = subjects[i].tracer->trace(batch);
+                const double cpu = double(std::clock() - before) / CLOCKS_PER_SEC;
+                if (repeat == 0) {  // compiles, allocates, warms up
+                    uint64_t turns = 0;
+                    for (const RayResult& r : results) turns += r.turns;
+                    rows[i].turns_per_ray = double(turns) / double(batch.size());
+                } else {
+                    times[i].push_back(subjects[i].by_cpu ? cpu : subjects[i].tracer->seconds);
+                }
             }
         }
-        CostRow row{coherent ? "primary" : "random", knot.triangles.size(), batch.size()};
-        row.seconds = std::numeric_limits<double>::infinity();
-        row.cpu_seconds = row.seconds;
-        for (int repeat = 0; repeat < 7; ++repeat) {
-            const std::clock_t before = std::clock();
-            const auto results = tracer.trace(batch);
-            row.cpu_seconds = std::min(row.cpu_seconds, double(std::clock() - before) / CLOCKS_PER_SEC);
-            row.seconds = std::min(row.seconds, tracer.seconds);
-            uint64_t turns = 0;
-            for (const RayResult& r : results) turns += r.turns;
-            row.turns_per_ray = double(turns) / double(batch.size());
+        for (size_t i = 0; i < subjects.size(); ++i) {
+            CostRow& row = rows[i];
+            row.workload = coherent ? "primary" : "random";
+            row.triangles = knot.triangles.size();
+            row.rays = batch.size();
+            row.by_cpu = subjects[i].by_cpu;
+            row.seconds = median(times[i]);
+            std::vector<double> ratios;
+            for (size_t k = 0; k < times[i].size(); ++k) ratios.push_back(times[i][k] / times[0][k]);
+            row.against_first = median(ratios);
+            row.scene_bytes = subjects[i].tracer->scene_bytes();
+            subjects[i].report->cost.push_back(row);
         }
-        rows.push_back(row);
     }
 }
 

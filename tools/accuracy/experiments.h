@@ -5,8 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "device_tracer.h"
+#include "agreement.h"
 #include "leaks.h"
+#include "ray_tracer.h"
 
 namespace rtc::lab {
 
@@ -23,41 +24,43 @@ struct CullRow {
     uint64_t rays = 0, culls = 0;
 };
 
-// First hits against exact arithmetic.
-struct ExactRow {
-    std::string scene;
-    uint64_t rays = 0, hits = 0;
-    uint64_t missed = 0;      // exact hit, device miss
-    uint64_t invented = 0;    // device hit, exact miss
-    uint64_t wrong = 0;       // another triangle, not a tie on an edge
-    uint64_t ties = 0;        // another triangle, and exact arithmetic has the ray on an edge
-    double worst_margin = 0;  // how far from an edge a difference was, in barycentric weight
-    double t_p50 = 0, t_p99 = 0, t_p999 = 0, t_max = 0;  // error of t in ulps of the exact t
-};
-
 // Cost of the same binary: closest hits on a mesh of `triangles`.
 struct CostRow {
     std::string workload;
-    uint64_t triangles = 0, rays = 0;
-    double seconds = 0, turns_per_ray = 0;
-    double cpu_seconds = 0;  // of this process: the steadier figure for devices that are the CPU
-    double mrays() const { return seconds > 0 ? double(rays) / seconds / 1e6 : 0; }
+    uint64_t triangles = 0, rays = 0, scene_bytes = 0;
+    bool by_cpu = false;       // `seconds` are this process's CPU seconds: the steadier figure for devices that are the CPU
+    double seconds = 0;        // median
+    double against_first = 1;  // median of the ratios to the first subject's time in the same round
+    double turns_per_ray = 0;  // 0: not known
+};
+
+// Rays that leave surfaces (rtc/spawn.glsl) and hit the triangle that they leave; `thin`: of slivers of 1e-6.
+struct SelfHits {
+    uint64_t rays = 0, hits = 0, thin_rays = 0, thin_hits = 0;
 };
 
 struct Report {
-    Variant variant = Variant::Watertight;
+    std::string subject;
     std::vector<LeakRow> leaks;
     std::vector<CullRow> culls;
-    std::vector<ExactRow> exact;
+    std::vector<AgreementRow> agreement;
     std::vector<CostRow> cost;
+    SelfHits self_hits;
+    std::string problem;  // why it could not be measured
+};
+
+struct CostSubject {
+    RayTracer* tracer;
+    Report* report;
+    bool by_cpu;
 };
 
 // Names for --axes.
 const std::vector<std::string>& axis_names();
 
-void measure_axis(DeviceTracer& tracer, const std::string& axis, uint64_t rays, std::vector<LeakRow>& rows);
-void measure_culls(DeviceTracer& tracer, uint64_t rays, std::vector<CullRow>& rows);
-void measure_exact(DeviceTracer& tracer, uint64_t rays, std::vector<ExactRow>& rows);
-void measure_cost(DeviceTracer& tracer, uint64_t rays, std::vector<CostRow>& rows);
+void measure_axis(RayTracer& tracer, const std::string& axis, uint64_t rays, std::vector<LeakRow>& rows);
+void measure_culls(RayTracer& tracer, uint64_t rays, std::vector<CullRow>& rows);
+// Interleaved: every subject traces the same rays `repeats` times, in turns. Adds two rows to each report.
+void measure_cost(const std::vector<CostSubject>& subjects, uint64_t rays, unsigned repeats);
 
 }  // namespace rtc::lab

@@ -93,6 +93,7 @@ class RtcLauncher {
     RtrRecorder recorder_ = nullptr;
     Buffer table_, control_, scratch_;
     RtrSbtLayout table_layout_{};
+    uint32_t rounds_ = 1;  // of a launch, at most
     VkDeviceSize raygen_offset_ = 0;
     struct StructurePlace {
         VkDescriptorSet set;

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstring>
+#include <string_view>
 
 #include "error.h"
 #include "pipeline_statistics.h"
@@ -12,6 +13,8 @@ namespace {
 // Suspended lanes of this many bytes at most; larger launches go in tiles.
 constexpr VkDeviceSize kScratchLimit = 96u << 20;
 constexpr uint32_t kRounds = 64;  // the runtime's default
+// Exact decisions take long: a lane may need one round for every few of them.
+constexpr uint32_t kExactRounds = 2048;
 
 std::vector<RtrSbtRecord> convert(const std::vector<JobRecord>& records) {
     std::vector<RtrSbtRecord> converted;
@@ -98,9 +101,12 @@ void RtcLauncher::make_recorder() {
         tiles = std::max(1u, rtrGetLaunchTileCount(device_.handle, pipeline_, extent_.width, extent_.height,
                                                    extent_.depth, size, 0));
     }
-    const bool resumable = info().moduleFlags & RTC_MODULE_RESUMABLE;
-    const VkDeviceSize control_size =
-        rtrGetRecorderControlSize(device_.handle, kLaunches, tiles, resumable ? kRounds : 1);
+    const RtrPipelineInfo pipeline = info();
+    const std::string_view reflection(pipeline.pReflectionJson ? pipeline.pReflectionJson : "",
+                                      pipeline.reflectionJsonSize);
+    const bool exact = reflection.find("\"accuracy\":\"exact") != std::string_view::npos;
+    rounds_ = !(pipeline.moduleFlags & RTC_MODULE_RESUMABLE) ? 1 : (exact ? kExactRounds : kRounds);
+    const VkDeviceSize control_size = rtrGetRecorderControlSize(device_.handle, kLaunches, tiles, rounds_);
     control_ = Buffer(device_.context, control_size, RTR_CONTROL_BUFFER_USAGE, MemoryKind::Shared);
     RtrRecorderCreateInfo recorderInfo{};
     recorderInfo.controlBuffer = control_.handle;
@@ -150,6 +156,7 @@ void RtcLauncher::record(VkCommandBuffer commands, const std::vector<uint8_t>& p
         if (scratch_.handle)
             device_.check(rtrCmdSetLaunchScratch(recorder_, scratch_.handle, 0, scratch_.size),
                           "rtrCmdSetLaunchScratch");
+        device_.check(rtrCmdSetLaunchLimits(recorder_, 0, rounds_), "rtrCmdSetLaunchLimits");
         device_.check(rtrCmdBindPipeline(recorder_, pipeline_), "rtrCmdBindPipeline");
         // A set that holds the module's own bindings is the last of its bind call.
         const uint32_t count = uint32_t(descriptors_->sets.size());

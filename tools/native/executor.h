@@ -118,6 +118,8 @@ class Executor {
     virtual void trace(VkCommandBuffer commands, const Launch& launch) = 0;
     // After the commands have completed: "" or the launch error, as "NAME: text" ("recursion-depth: ...").
     virtual std::string finish() { return {}; }
+    // Of all acceleration structures built, 0 where nobody counts them.
+    virtual VkDeviceSize structure_bytes() const { return 0; }
     // Device address of a top level, 0 where there is none.
     virtual VkDeviceAddress top_address(uint32_t) const { return 0; }
 };

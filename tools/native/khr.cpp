@@ -135,6 +135,13 @@ class KhrExecutor final : public Executor {
         vkUpdateDescriptorSets(context_.device, 1, &write, 0, nullptr);
     }
 
+    VkDeviceSize structure_bytes() const override {
+        VkDeviceSize bytes = 0;
+        for (const Built& built : bottoms_) bytes += built.memory.size;
+        for (const Built& built : tops_) bytes += built.memory.size;
+        return bytes;
+    }
+
     VkDeviceAddress top_address(uint32_t top) const override { return tops_.at(top).address; }
 
     void trace(VkCommandBuffer commands, const Launch& launch) override {

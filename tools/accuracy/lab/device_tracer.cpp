@@ -215,6 +215,8 @@ void DeviceTracer::set_scene(const HostScene& scene) {
     s.root = scene.root;
 }
 
+uint64_t DeviceTracer::scene_bytes() const { return state_->heap.size; }
+
 std::vector<RayResult> DeviceTracer::trace(const std::vector<Ray>& rays) {
     const uint32_t lanes = (uint32_t(rays.size()) + 63) / 64 * 64;
     std::vector<uint32_t> params(RTC_PARAM_QUADS * 4);

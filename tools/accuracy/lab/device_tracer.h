@@ -6,41 +6,10 @@
 #include <string_view>
 #include <vector>
 
-#include "host_scene.h"
+#include "ray_tracer.h"
 #include "vulkan_context.h"
 
 namespace rtc::lab {
-
-struct Ray {
-    Vec3 origin;
-    float tmin = 0;
-    Vec3 direction;
-    float tmax = 0;
-    uint32_t flags = 0;
-    uint32_t mask = 0xff;
-    uint32_t sbt = 0;  // offset | stride << 4 | mode << 8
-    float report_t = 0;
-};
-
-enum RayMode : uint32_t {
-    kIgnore = 1u << 8,     // any-hit ignores every candidate
-    kTerminate = 2u << 8,  // any-hit terminates the ray
-    kNoReport = 4u << 8,   // intersection reports nothing
-    kNullRoot = 8u << 8,
-    kBottomRoot = 16u << 8,  // trace a bottom level
-    kPause = 32u << 8,       // what TracerOptions::pause sets
-};
-
-struct RayResult {
-    float t;
-    uint32_t kind, instance, primitive, geometry, record;
-    uint32_t attr0, attr1, attr7;
-    uint32_t front, back, boxes;
-    uint32_t turns, suspensions, mismatches, last_opaque;
-    bool operator==(const RayResult&) const = default;
-};
-
-constexpr uint32_t kNoInstance = 0xffffffffu;
 
 // Probe traces nothing: it asks for lanes and records (lab_probe.comp).
 enum class Variant { Watertight, Fast, Exact, Exact64, Contracted, Probe };
@@ -58,18 +27,19 @@ struct TracerOptions {
     bool any_hit = true, aabbs = true, triangles = true, resumable = true;
 };
 
-class DeviceTracer {
+class DeviceTracer final : public RayTracer {
   public:
     DeviceTracer(const tools::Context& context, const TracerOptions& options);
-    ~DeviceTracer();
+    ~DeviceTracer() override;
 
     // Float64: for the negative control and exact64.
     static bool needs_float64(Variant variant) {
         return variant == Variant::Contracted || variant == Variant::Exact64;
     }
 
-    void set_scene(const HostScene& scene);
-    std::vector<RayResult> trace(const std::vector<Ray>& rays);
+    void set_scene(const HostScene& scene) override;
+    std::vector<RayResult> trace(const std::vector<Ray>& rays) override;
+    uint64_t scene_bytes() const override;
 
     // Variant::Probe: a dispatch of `groups_x` by `groups_y` with these parameter and SBT words.
     // `indices` has one entry a lane; results are 16 words a lane.
@@ -77,7 +47,6 @@ class DeviceTracer {
                                 const std::vector<uint32_t>& indices, uint32_t groups_x, uint32_t groups_y);
     std::vector<uint32_t> control() const;  // control block words of the last dispatch
 
-    double seconds = 0;  // of the last trace, on the device
     uint32_t error = 0;  // launch error of the last trace
     uint32_t error_count = 0;
     uint32_t error_detail = 0;

@@ -329,6 +329,8 @@ HostScene build_scene(const std::vector<Blas>& blases, const std::vector<Instanc
                       const BuildOptions& options) {
     Heap heap;
     HostScene scene;
+    scene.blases = blases;
+    scene.instances = instances;
     std::vector<Built> built;
     for (const Blas& blas : blases) {
         built.push_back(build_blas(heap, blas, options));

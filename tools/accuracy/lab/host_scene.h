@@ -56,6 +56,9 @@ struct HostScene {
     uint32_t root = 0;
     std::vector<Transform> world_to_object;  // as traversal reads it
     uint32_t max_depth = 0;
+    // What it was built from, for tracers that build their own.
+    std::vector<Blas> blases;
+    std::vector<Instance> instances;
 };
 
 HostScene build_scene(const std::vector<Blas>& blases, const std::vector<Instance>& instances,

@@ -74,7 +74,7 @@ std::vector<Ray> leak_rays(const LeakCase& c, uint64_t count, uint64_t batch) {
     return rays;
 }
 
-LeakCounts count_leaks(DeviceTracer& tracer, const LeakCase& c, uint64_t total) {
+LeakCounts count_leaks(RayTracer& tracer, const LeakCase& c, uint64_t total) {
     LeakCounts counts;
     for (uint64_t batch = 0; counts.rays < total; ++batch) {
         const std::vector<Ray> rays = leak_rays(c, std::min(kBatch, total - counts.rays), batch);
@@ -92,7 +92,7 @@ LeakCounts count_leaks(DeviceTracer& tracer, const LeakCase& c, uint64_t total) 
     return counts;
 }
 
-uint64_t count_false_culls(DeviceTracer& tracer, const LeakCase& c, uint64_t total) {
+uint64_t count_false_culls(RayTracer& tracer, const LeakCase& c, uint64_t total) {
     uint64_t culls = 0, done = 0;
     BuildOptions generous;
     generous.inflate = 0.05f;

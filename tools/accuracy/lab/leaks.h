@@ -6,7 +6,7 @@
 
 #include <cstdint>
 
-#include "device_tracer.h"
+#include "ray_tracer.h"
 #include "meshes.h"
 
 namespace rtc::lab {
@@ -36,13 +36,13 @@ struct LeakCounts {
 };
 
 // The tracer's scene must hold the case's mesh as its only instance.
-LeakCounts count_leaks(DeviceTracer& tracer, const LeakCase& c, uint64_t rays);
+LeakCounts count_leaks(RayTracer& tracer, const LeakCase& c, uint64_t rays);
 std::vector<Ray> leak_rays(const LeakCase& c, uint64_t rays, uint64_t batch);
 
 HostScene leak_scene(const LeakCase& c, const BuildOptions& options = {});
 
 // False box culls: rays that see other candidates once every box of both
 // levels is generously inflated. Sets the tracer's scene.
-uint64_t count_false_culls(DeviceTracer& tracer, const LeakCase& c, uint64_t rays);
+uint64_t count_false_culls(RayTracer& tracer, const LeakCase& c, uint64_t rays);
 
 }  // namespace rtc::lab

@@ -1,0 +1,294 @@
+// rtc-accuracy without a command: cost and errors of rtc's tiers, the device's own ray tracing and Embree on the same
+// rays, as one table and one plot.
+#include <algorithm>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "campaign.h"
+#include "command_line.h"
+#include "commands.h"
+#include "embree_tracer.h"
+#include "error.h"
+#include "experiments.h"
+#include "native_tracer.h"
+#include "report.h"
+
+namespace rtc::lab {
+namespace {
+
+using tools::Error;
+using Json = nlohmann::ordered_json;
+
+const std::vector<std::string> kAll = {"fast",       "watertight", "exact",       "exact64",
+                                       "contracted", "native",     "embree-fast", "embree-robust"};
+
+bool is_embree(const std::string& name) { return name == "embree-fast" || name == "embree-robust"; }
+
+struct Settings {
+    std::string device;
+    std::vector<std::string> axes;
+    uint64_t rays = 1 << 17, cull_rays = 0, first_hits = 0, self_hits = 0, cost_rays = 0;
+    unsigned repeats = 7;
+    double seconds = 0;
+    bool validate = false, while_while = false, storage = false, quiet = false;
+    uint32_t shared_stack = 0;
+};
+
+// One thing that traces, in the forms that the experiments want.
+class Subject {
+  public:
+    Subject(std::string name, const Settings& settings) : name_(std::move(name)) {
+        if (is_embree(name_)) {
+            counting_ = make_embree_tracer(name_ == "embree-fast" ? EmbreeMode::Fast : EmbreeMode::Robust);
+            by_cpu_ = true;
+            return;
+        }
+        context_ = campaign_context(name_, settings.device, settings.validate);
+        device_ = tools::describe_device(context_->properties, context_->driver);
+        by_cpu_ = context_->properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
+        if (name_ == "native") {
+            counting_ = make_native_tracer(*context_, true);
+            first_hits_ = make_native_tracer(*context_, false);
+            return;
+        }
+        TracerOptions options;
+        options.variant = parse_variant(name_);
+        options.while_while = settings.while_while;
+        options.storage_fetch = settings.storage;
+        options.shared_stack = settings.shared_stack;
+        options.aabbs = false;
+        TracerOptions lean = options;  // as a pipeline without any-hit and intersection shaders would have it
+        lean.any_hit = lean.resumable = false;
+        cost_ = std::make_unique<DeviceTracer>(*context_, lean);
+        // Lavapipe 22.3 ends loops of many turns.
+        options.step_budget = 6000;
+        options.pause = true;
+        counting_ = std::make_unique<DeviceTracer>(*context_, options);
+        options.any_hit = false;
+        first_hits_ = std::make_unique<DeviceTracer>(*context_, options);
+    }
+
+    RayTracer& counting() { return *counting_; }
+    RayTracer& first_hits() { return first_hits_ ? *first_hits_ : *counting_; }
+    RayTracer& cost() { return cost_ ? *cost_ : first_hits(); }
+    const tools::Context* context() const { return context_.get(); }
+    const std::string& device() const { return device_; }
+    bool by_cpu() const { return by_cpu_; }
+
+  private:
+    std::string name_, device_;
+    std::unique_ptr<tools::Context> context_;
+    std::unique_ptr<RayTracer> counting_, first_hits_, cost_;
+    bool by_cpu_ = false;
+};
+
+SelfHits measure_self_hits(const tools::Context& context, const std::string& subject, uint64_t rays) {
+    const std::vector<CampaignPoint> points = spawn_points();
+    const auto tracer = make_campaign_tracer(context, subject, CampaignProgram::Spawn, points);
+    CampaignSettings settings;
+    settings.program = CampaignProgram::Spawn;
+    settings.rays = rays;
+    settings.quiet = true;
+    SelfHits sum;
+    for (const CampaignRow& row : run_campaign(*tracer, points, false, settings).rows) {
+        const bool thin = row.mesh == "slivers";
+        (thin ? sum.thin_rays : sum.rays) += row.rays;
+        (thin ? sum.thin_hits : sum.hits) += row.events;
+    }
+    return sum;
+}
+
+Json to_json(const Report& report) {
+    Json json{{"tier", report.subject}};
+    if (!report.problem.empty()) json["problem"] = report.problem;
+    for (const CostRow& r : report.cost)
+        json["cost"].push_back({{"workload", r.workload},
+                                {"triangles", r.triangles},
+                                {"rays", r.rays},
+                                {"seconds", r.seconds},
+                                {"cpu_time", r.by_cpu},
+                                {"against_first", r.against_first},
+                                {"turns_per_ray", r.turns_per_ray},
+                                {"scene_bytes", r.scene_bytes}});
+    for (const LeakRow& r : report.leaks)
+        json["leaks"].push_back({{"axis", r.axis},
+                                 {"value", r.value},
+                                 {"mesh", r.mesh},
+                                 {"aim", r.aim},
+                                 {"rays", r.counts.rays},
+                                 {"unbalanced", r.counts.unbalanced},
+                                 {"missed", r.counts.missed},
+                                 {"bound_95", upper_bound(r.counts.unbalanced, r.counts.rays)},
+                                 {"promised_zero", r.must_be_zero}});
+    for (const CullRow& r : report.culls)
+        json["culls"].push_back({{"mesh", r.mesh}, {"place", r.place}, {"rays", r.rays}, {"culled", r.culls}});
+    for (const AgreementRow& r : report.agreement)
+        json["agreement"].push_back({{"axis", r.axis},
+                                     {"cases", r.cases},
+                                     {"rays", r.rays},
+                                     {"hits", r.hits},
+                                     {"missed", r.missed},
+                                     {"invented", r.invented},
+                                     {"other", r.inverted},
+                                     {"of_these_denormal", r.denormal},
+                                     {"by_rule", r.by_rule},
+                                     {"missed_plainly", r.missed_plainly},
+                                     {"invented_plainly", r.invented_plainly},
+                                     {"later", r.later},
+                                     {"t_ulp_p50", r.t_p50},
+                                     {"t_ulp_p99", r.t_p99},
+                                     {"t_ulp_p99_9", r.t_p999},
+                                     {"t_ulp_max", r.t_max},
+                                     {"first_difference", r.first}});
+    if (report.self_hits.rays)
+        json["self_hits"] = {{"rays", report.self_hits.rays},
+                             {"hits", report.self_hits.hits},
+                             {"thin_rays", report.self_hits.thin_rays},
+                             {"thin_hits", report.self_hits.thin_hits}};
+    return json;
+}
+
+// What decides the exit code. The tiers must be clean where they promise to be; the negative control must not be.
+bool verdict(const Report& report) {
+    uint64_t broken = 0, total = 0;
+    for (const LeakRow& r : report.leaks) {
+        total += r.counts.unbalanced;
+        if (r.must_be_zero) broken += r.counts.unbalanced;
+    }
+    for (const CullRow& r : report.culls) broken += r.culls;
+    if (report.subject == "watertight" && broken) {
+        std::fprintf(stderr,
+                     "rtc-accuracy: error: watertight: %llu leaks, double hits or false culls where none are promised\n",
+                     (unsigned long long)broken);
+        return false;
+    }
+    if (report.subject == "contracted" && !report.leaks.empty() && total == 0) {
+        std::fprintf(stderr, "rtc-accuracy: error: the negative control does not leak: this measurement is blind\n");
+        return false;
+    }
+    uint64_t differ = 0;
+    for (const AgreementRow& r : report.agreement)
+        if (r.axis == "all") differ = r.different() - r.denormal;
+    if ((report.subject == "exact" || report.subject == "exact64") && differ) {
+        std::fprintf(stderr, "rtc-accuracy: error: %s: %llu hits differ from exact arithmetic\n", report.subject.c_str(),
+                     (unsigned long long)differ);
+        return false;
+    }
+    return true;
+}
+
+void measure(Subject& subject, Report& report, const Settings& settings) {
+    for (const std::string& axis : settings.axes) measure_axis(subject.counting(), axis, settings.rays, report.leaks);
+    // Inflated boxes are rtc's trees'.
+    const bool own = report.subject != "native" && !is_embree(report.subject);
+    if (settings.cull_rays && own) measure_culls(subject.counting(), settings.cull_rays, report.culls);
+    if (settings.first_hits) {
+        AgreementSettings agreement;
+        agreement.rays = settings.first_hits;
+        agreement.quiet = true;
+        AgreementRow total;
+        report.agreement = measure_agreement(subject.first_hits(), agreement, &total);
+        report.agreement.push_back(total);
+    }
+    if (settings.self_hits && subject.context())
+        report.self_hits = measure_self_hits(*subject.context(), report.subject, settings.self_hits);
+}
+
+}  // namespace
+
+int measure_command(int argc, char** argv) {
+    CLI::App app{"Measures leaks, exactness and cost of rtc's traversal on a device, of the device's own ray tracing and\n"
+                 "of Embree, on the same rays.\n"
+                 "rtc-accuracy leaks --help: campaigns whose rays the device makes.\n"
+                 "rtc-accuracy spawn --help: self-hits of rays that leave surfaces.\n"
+                 "rtc-accuracy agree --help: first hits against exact arithmetic.\n"
+                 "rtc-accuracy report --help: tables and plots from what --json wrote."};
+    std::vector<std::string> tiers = {"watertight"};
+    std::string json_path, markdown_path, plot_path;
+    Settings settings;
+    settings.axes = {"mesh"};
+    app.add_option("--tier", tiers,
+                   "fast, watertight, exact, exact64, contracted (the negative control), native, embree-fast, "
+                   "embree-robust or all; times are compared with the first's")
+        ->delimiter(',');
+    app.add_option("--device", settings.device, "device index or part of its name");
+    app.add_option("--axes", settings.axes, "mesh, offset, size, aspect, distance, transform, zeros, all or none")
+        ->delimiter(',');
+    app.add_option("--rays", settings.rays, "rays per point and aim");
+    app.add_option("--culls", settings.cull_rays, "rays per place for false box culls");
+    app.add_option("--first-hits", settings.first_hits, "rays against exact arithmetic, over all axes of `agree`");
+    app.add_option("--self-hits", settings.self_hits, "rays that leave surfaces, for each aim");
+    app.add_option("--cost", settings.cost_rays, "rays per workload for the cost");
+    app.add_option("--repeats", settings.repeats, "times that the cost is measured, in turns");
+    app.add_option("--json", json_path, "write all figures");
+    app.add_option("--markdown", markdown_path, "write the table");
+    app.add_option("--plot", plot_path, "write cost against error as SVG");
+    app.add_flag("--validate", settings.validate, "run under the validation layers");
+    app.add_flag("--while-while", settings.while_while, "inner loop over nodes");
+    app.add_flag("--storage-fetch", settings.storage, "fetch nodes from a storage buffer");
+    app.add_option("--shared-stack", settings.shared_stack, "stack entries in shared memory");
+    app.add_flag("--quiet", settings.quiet, "no progress");
+    if (const int status = tools::parse_command_line(app, "rtc-accuracy", argc, argv); status >= 0) return status;
+    if (tiers == std::vector<std::string>{"all"}) tiers = kAll;
+    if (settings.axes == std::vector<std::string>{"all"}) settings.axes = axis_names();
+    if (settings.axes == std::vector<std::string>{"none"}) settings.axes.clear();
+    if (settings.rays == 0) throw Error("--rays must not be 0");
+    if (settings.repeats == 0) throw Error("--repeats must not be 0");
+    for (const std::string& tier : tiers)
+        if (std::find(kAll.begin(), kAll.end(), tier) == kAll.end()) {
+            std::string known;
+            for (const std::string& name : kAll) known += ", " + name;
+            throw Error("unknown tier \"" + tier + "\": one of" + known.substr(1) + " or all");
+        }
+
+    std::string device;
+    bool by_cpu = true, good = true;
+    std::vector<std::unique_ptr<Subject>> subjects(tiers.size());
+    std::vector<Report> reports(tiers.size());
+    auto attempt = [&](size_t i, auto&& work) {
+        if (!reports[i].problem.empty()) return;
+        try {
+            work();
+        } catch (const tools::MissingFeature& problem) {  // the others may still run
+            reports[i].problem = std::string("skipped: ") + problem.what();
+            std::printf("%s: %s\n", tiers[i].c_str(), reports[i].problem.c_str());
+        } catch (const Error& problem) {
+            reports[i].problem = problem.what();
+            if (tiers[i] == "native" && !subjects[i]) return;  // few devices have it
+            std::fprintf(stderr, "rtc-accuracy: error: %s: %s\n", tiers[i].c_str(), problem.what());
+            good = false;
+        }
+    };
+    for (size_t i = 0; i < tiers.size(); ++i) {
+        reports[i].subject = tiers[i];
+        attempt(i, [&] { subjects[i] = std::make_unique<Subject>(tiers[i], settings); });
+        if (subjects[i] && subjects[i]->context()) {
+            device = subjects[i]->device();
+            by_cpu = subjects[i]->by_cpu();
+        }
+    }
+    if (settings.cost_rays) {
+        std::vector<CostSubject> costs;
+        for (size_t i = 0; i < tiers.size(); ++i)
+            if (subjects[i]) costs.push_back({&subjects[i]->cost(), &reports[i], subjects[i]->by_cpu()});
+        measure_cost(costs, settings.cost_rays, settings.repeats);
+    }
+    for (size_t i = 0; i < tiers.size(); ++i) {
+        if (!settings.quiet) std::fprintf(stderr, "%s ...\n", tiers[i].c_str());
+        attempt(i, [&] { measure(*subjects[i], reports[i], settings); });
+        good = verdict(reports[i]) && good;
+    }
+    Json json{{"device", device.empty() ? "the host" : device}, {"by_cpu", by_cpu}};
+    for (const Report& report : reports) json["tiers"].push_back(to_json(report));
+    const DeviceReport summary = summarise({json}).at(0);
+    const std::string table = markdown_table(summary, "");
+    std::fputs(table.c_str(), stdout);
+    if (!markdown_path.empty()) write_file(markdown_path, table);
+    if (!plot_path.empty()) write_file(plot_path, plot_svg(summary));
+    if (!json_path.empty()) write_file(json_path, json.dump(1) + "\n");
+    for (const auto& subject : subjects)
+        if (subject && subject->context() && subject->context()->validating()) subject->context()->require_silent_validation();
+    return good ? 0 : 1;
+}
+
+}  // namespace rtc::lab
