@@ -47,8 +47,8 @@ void Machine::freeze_link_constants(const std::map<uint32_t, uint32_t>& values) 
 Id Machine::function(const std::string& name) const { return variable(name); }
 
 Id Machine::find_export(const std::string& name) const {
-    const auto found = exports_->find(name);
-    return found == exports_->end() ? 0 : imported_.get(found->second);
+    const auto found = traversal_->exports.find(name);
+    return found == traversal_->exports.end() ? 0 : found->second;
 }
 
 Id Machine::variable(const std::string& name) const {
@@ -59,7 +59,7 @@ Id Machine::variable(const std::string& name) const {
 
 Id Machine::call(Emitter& e, const std::string& name, const std::vector<Id>& arguments) const {
     const Id id = function(name);
-    return e.call(id, export_types_.get(id), arguments);
+    return e.call(id, traversal_->result_types.get(id), arguments);
 }
 
 Id Machine::load(Emitter& e, const std::string& name) const {

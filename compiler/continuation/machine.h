@@ -48,6 +48,16 @@ struct State {
 // Functions, and module-scope variables each reads or writes.
 using TouchedVariables = std::vector<std::pair<Id, std::set<Id>>>;
 
+// A program as it is when a machine was begun and traversal imported.
+struct PreparedTraversal {
+    Program program;  // its functions are those of traversal
+    Id begun = 0;     // the bound before traversal
+    std::map<std::string, Id> exports;
+    TouchedVariables touched;       // candidates' variables
+    ir::IdMap<Id> result_types;     // by function
+    std::map<uint32_t, Id> reserved;  // resources by RTC_BINDING_*
+};
+
 class Machine {
   public:
     Machine(Program& program, const LinkOptions& options);
@@ -61,7 +71,7 @@ class Machine {
 
     // ---- traversal exports, by the names of compiler/traversal ----
     std::vector<Function> traversal_functions;
-    // `choices`: link constants (RTC_LINK_*) known already.
+    // `choices`: link constants (RTC_LINK_*) known already. Nothing but this machine may be in the program yet.
     void import_traversal(const TraversalModule& traversal, const std::map<uint32_t, uint32_t>& choices);
     // Gives the other link constants their values, once the stages are known.
     void freeze_link_constants(const std::map<uint32_t, uint32_t>& values);
@@ -161,10 +171,7 @@ class Machine {
 
     std::vector<Inst> variables_;
     std::vector<Id> payload_words_, callable_words_, frame_words_;
-    const std::map<std::string, Id>* exports_ = nullptr;  // as the prepared module numbers them
-    const TouchedVariables* touched_ = nullptr;           // likewise
-    ir::IdMap<Id> imported_;                              // prepared module's id -> here
-    ir::IdMap<Id> export_types_;                          // result types of traversal functions
+    const PreparedTraversal* traversal_ = nullptr;
 };
 
 // traversal_import.cpp

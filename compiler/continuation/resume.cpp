@@ -35,8 +35,8 @@ std::vector<Id> Machine::carried_variables(const std::vector<Function>& stage_fu
     candidates.insert(candidates.end(), stage_variables.begin(), stage_variables.end());
     candidates.push_back(record);
     // A pending candidate, read by any-hit and intersection shaders.
-    for (const auto& [name, id] : *exports_)
-        if (name.rfind("rtc_cand_", 0) == 0) candidates.push_back(imported_.get(id));
+    for (const auto& [name, id] : traversal_->exports)
+        if (name.rfind("rtc_cand_", 0) == 0) candidates.push_back(id);
     ir::IdMap<uint32_t> number;  // of a candidate, plus one
     for (size_t i = 0; i < candidates.size(); ++i) number[candidates[i]] = static_cast<uint32_t>(i + 1);
     // Sets of candidates.
@@ -58,10 +58,10 @@ std::vector<Id> Machine::carried_variables(const std::vector<Function>& stage_fu
     ir::IdMap<uint32_t> function_index;  // in `touched`, plus one
     std::vector<std::pair<Id, Id>> calls;
     // (Traversal's functions know nothing but candidates.)
-    for (const auto& [function, variables] : *touched_) {
+    for (const auto& [function, variables] : traversal_->touched) {
         Set& set = touched.emplace_back(words);
-        function_index[imported_.get(function)] = static_cast<uint32_t>(touched.size());
-        for (Id id : variables) add(set, number.get(imported_.get(id)) - 1);
+        function_index[function] = static_cast<uint32_t>(touched.size());
+        for (Id id : variables) add(set, number.get(id) - 1);
     }
     for (const std::vector<Function>* functions : {&stage_functions, &helper_functions})
         for (const Function& function : *functions) {

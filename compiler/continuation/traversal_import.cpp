@@ -1,7 +1,9 @@
 // The traversal module, from the words that come with rtc to what a pipeline links.
 //
 // Everything that does not depend on the pipeline beyond a few switches is done once in a
-// process and kept: small pipelines would spend most of their time on it otherwise.
+// process and kept: small pipelines would spend most of their time on it otherwise. What is kept
+// is the program that every link begins with, a machine's variables and the traversal; a link
+// copies it, and no id has to be mapped.
 #include <memory>
 #include <mutex>
 #include <set>
@@ -200,12 +202,6 @@ ir::Module prepare(const ir::Module& words, const std::map<uint32_t, uint32_t>& 
     return std::move(p.module);
 }
 
-struct Prepared {
-    ir::Module module;
-    std::map<std::string, Id> exports;
-    TouchedVariables touched;
-};
-
 // Which of the exported variables of a pending candidate each function reads or writes, itself or by calls.
 TouchedVariables touched_candidates(const ir::Module& module, const std::map<std::string, Id>& exports) {
     ir::IdSet candidates;
@@ -230,42 +226,51 @@ TouchedVariables touched_candidates(const ir::Module& module, const std::map<std
     return {touched.begin(), touched.end()};
 }
 
-// Prepared modules live as long as the process; there are as many as combinations of choices that occur.
-const Prepared& prepared(const TraversalModule& module, const std::map<uint32_t, uint32_t>& choices) {
+// Prepared traversals live as long as the process; there are as many as combinations of choices that occur.
+const PreparedTraversal& prepared(const TraversalModule& module, const std::map<uint32_t, uint32_t>& choices) {
     static std::mutex mutex;
-    static std::map<std::pair<const TraversalModule*, std::map<uint32_t, uint32_t>>, std::unique_ptr<const Prepared>> known;
+    static std::map<std::pair<const TraversalModule*, std::map<uint32_t, uint32_t>>,
+                    std::unique_ptr<const PreparedTraversal>> known;
     const std::lock_guard lock(mutex);
-    std::unique_ptr<const Prepared>& entry = known[{&module, choices}];
-    if (!entry) {
-        auto fresh = std::make_unique<Prepared>();
-        fresh->module = prepare(ir::read_module({module.words, module.words + module.count}, "traversal"), choices);
-        fresh->exports = exports_of(fresh->module);
-        fresh->touched = touched_candidates(fresh->module, fresh->exports);
-        entry = std::move(fresh);
+    std::unique_ptr<const PreparedTraversal>& entry = known[{&module, choices}];
+    if (entry) return *entry;
+    const ir::Module source =
+        prepare(ir::read_module({module.words, module.words + module.count}, "traversal"), choices);
+    auto fresh = std::make_unique<PreparedTraversal>();
+    Program& p = fresh->program;
+    const LinkOptions any;
+    const Machine machine(p, any);
+    fresh->begun = p.module.bound;
+    ir::IdMap<Id> map;
+    p.module.functions = p.import(source, map);
+    p.module.version = source.version;
+    if (module.addresses) p.module.addressing = source.addressing;
+    for (const auto& [name, id] : exports_of(source)) fresh->exports[name] = map.get(id);
+    fresh->touched = touched_candidates(p.module, fresh->exports);
+    for (const Function& function : p.module.functions) fresh->result_types[function.id()] = function.def.type;
+    for (const Inst& inst : p.module.globals)
+        if (inst.op == Op::OpVariable) {
+            uint32_t binding = 0;
+            if (p.decoration(inst.result, spv::Decoration::Binding, &binding)) fresh->reserved[binding] = inst.result;
+        }
+    for (const auto& [binding, id] : fresh->reserved) {
+        p.remove_decorations(id, spv::Decoration::Binding);
+        p.remove_decorations(id, spv::Decoration::DescriptorSet);
     }
+    entry = std::move(fresh);
     return *entry;
 }
 
 }  // namespace
 
 void Machine::import_traversal(const TraversalModule& module, const std::map<uint32_t, uint32_t>& choices) {
-    const Prepared& known = prepared(module, choices);
-    const ir::Module& source = known.module;
-    traversal_functions = p.import(source, imported_);
-    p.module.version = source.version;
-    if (module.addresses) p.module.addressing = source.addressing;
-    exports_ = &known.exports;
-    touched_ = &known.touched;
-    for (const Function& function : traversal_functions) export_types_[function.id()] = function.def.type;
-    for (const Inst& inst : p.module.globals)
-        if (inst.op == Op::OpVariable) {
-            uint32_t binding = 0;
-            if (p.decoration(inst.result, spv::Decoration::Binding, &binding)) reserved[binding] = inst.result;
-        }
-    for (const auto& [binding, id] : reserved) {
-        p.remove_decorations(id, spv::Decoration::Binding);
-        p.remove_decorations(id, spv::Decoration::DescriptorSet);
-    }
+    traversal_ = &prepared(module, choices);
+    if (p.module.bound != traversal_->begun)
+        ir::fail("internal-traversal", "", 0, "traversal comes before everything but the machine");
+    p = traversal_->program;
+    traversal_functions = std::move(p.module.functions);
+    p.module.functions.clear();
+    reserved = traversal_->reserved;
 }
 
 }  // namespace rtc::continuation

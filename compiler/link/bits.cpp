@@ -1,3 +1,4 @@
+// The facts of one instruction from those of its operands, and the rounds that settle what variables hold.
 #include "link/bits.h"
 
 namespace rtc::link {
@@ -48,6 +49,8 @@ bool can_be_known(Op op) {
 
 // Deeper chains are rare, and nothing is lost but knowledge.
 constexpr int kMaxDepth = 64;
+// So are long chains of variables against the order of the code.
+constexpr int kMaxRounds = 64;
 
 }  // namespace
 
@@ -55,113 +58,141 @@ BitAnalysis::BitAnalysis(const ir::Program& program, const std::vector<const ir:
                          const std::map<Id, Bits>& given, bool module_variables, Tables& tables)
     : p_(program), t_(tables) {
     ++t_.analysis;
-    ++t_.epoch;
     for (const auto& [id, bits] : given) {
-        Cell& fixed = cell(id);
-        fixed.bits = bits;
-        fixed.fixed = true;
+        Cell& cell = cells_[make_cell(id)];
+        cell.bits = bits;
+        cell.given = true;
     }
-    collect(functions, module_variables);
+    if (module_variables)
+        for (const Inst& inst : p_.module.globals)
+            if (inst.op == Op::OpVariable &&
+                static_cast<spv::StorageClass>(inst.ops[0]) == spv::StorageClass::Private && mask(p_.pointee(inst.type)))
+                make_cell(inst.result);
+    for (const ir::Function* function : functions) collect(*function);
     settle();
 }
 
-uint32_t BitAnalysis::cell_of(Id id) {
-    Tables::Index& index = t_.cells[id];
-    if (index.analysis != t_.analysis) {
-        index = {static_cast<uint32_t>(cells_.size()), t_.analysis};
-        cells_.push_back({id, 0, 0, {}, false});
+uint32_t BitAnalysis::make_cell(Id id) {
+    Tables::Entry& known = entry(id);
+    if (!known.cell) {
+        cells_.push_back({id, 0, 0, {}, false, false});
+        known.cell = static_cast<uint32_t>(cells_.size());
     }
-    return index.cell;
+    return known.cell - 1;
 }
 
-void BitAnalysis::collect(const std::vector<const ir::Function*>& functions, bool module_variables) {
-    ir::IdSet open;  // touched by more than whole loads and stores
-    std::vector<std::pair<uint32_t, Id>> stored;  // cell, value
-    for (const ir::Function* function : functions) {
-        for (const ir::Block& block : function->blocks)
-            for (const Inst& inst : block.insts) {
-                if (inst.result) {
-                    t_.defs[inst.result] = {&inst, t_.analysis};
-                    if (can_be_known(inst.op) && (mask(inst.type) || inst.op == Op::OpSelect || inst.op == Op::OpPhi))
-                        candidates_.push_back(&inst);
-                }
-                switch (inst.op) {
-                    case Op::OpLoad: break;
-                    case Op::OpStore: {
-                        open.insert(inst.ops[1]);
-                        const Inst* variable = def(inst.ops[0]);
-                        if (!variable || variable->op != Op::OpVariable || !mask(p_.pointee(variable->type))) break;
-                        const auto storage = static_cast<spv::StorageClass>(variable->ops[0]);
-                        if (storage == spv::StorageClass::Function ||
-                            (storage == spv::StorageClass::Private && module_variables))
-                            stored.push_back({cell_of(inst.ops[0]), inst.ops[1]});
-                        break;
-                    }
-                    case Op::OpVariable:
-                        if (inst.ops.size() > 1 && mask(p_.pointee(inst.type)))
-                            stored.push_back({cell_of(inst.result), inst.ops[1]});
-                        break;
-                    case Op::OpReturnValue: stored.push_back({cell_of(function->id()), inst.ops[0]}); break;
-                    case Op::OpAccessChain:
-                    case Op::OpInBoundsAccessChain:
-                    case Op::OpCopyObject: open.insert(inst.ops[0]); break;
-                    case Op::OpFunctionCall:
-                    case Op::OpCopyMemory:
-                    case Op::OpExtInst:
-                    case Op::OpPhi:
-                    case Op::OpSelect:
-                        for (uint32_t id : inst.ops) open.insert(id);
-                        break;
-                    default:
-                        // Only pointers matter; conversions, arithmetic and comparisons take none.
-                        if (inst.op < Op::OpConvertFToU || inst.op > Op::OpBitCount)
-                            inst.for_each_id([&](Id id) { open.insert(id); });
-                        break;
-                }
+bool BitAnalysis::find_cell(Id id, uint32_t& cell) const {
+    const Tables::Entry& known = t_.entries.get(id);
+    if (known.analysis != t_.analysis || !known.cell) return false;
+    cell = known.cell - 1;
+    return true;
+}
+
+void BitAnalysis::collect(const ir::Function& function) {
+    for (const ir::Block& block : function.blocks) {
+        auto open = [&](Id id) {
+            if (uint32_t cell; find_cell(id, cell)) openings_.push_back({cell, block.label});
+        };
+        for (const Inst& inst : block.insts) {
+            if (inst.result) {
+                entry(inst.result).inst = &inst;
+                if (can_be_known(inst.op) && (mask(inst.type) || inst.op == Op::OpSelect || inst.op == Op::OpPhi))
+                    candidates_.push_back({&inst, block.label});
             }
-        candidate_ends_.push_back(candidates_.size());
-    }
-    for (const auto& [at, value] : stored) ++cells_[at].count;
-    uint32_t place = 0;
-    for (Cell& one : cells_) {
-        one.first = place;
-        place += one.count;
-        one.count = 0;
-    }
-    values_.resize(place);
-    for (const auto& [at, value] : stored) values_[cells_[at].first + cells_[at].count++] = value;
-    for (Cell& one : cells_) {
-        if (one.fixed) continue;
-        const Inst* variable = def(one.id);
-        const bool is_variable = variable && variable->op == Op::OpVariable;
-        const bool global_with_initializer = is_variable && !local(one.id) && variable->ops.size() > 1;
-        if ((is_variable && open.contains(one.id)) || global_with_initializer || one.count == 0) {
-            one.fixed = true;  // of unknown content
-            one.bits = {};
-        } else {
-            one.bits = {~0u, ~0u};
+            switch (inst.op) {
+                case Op::OpLoad: break;
+                case Op::OpStore:
+                    if (uint32_t cell; find_cell(inst.ops[0], cell))
+                        stored_.push_back({cell, inst.ops[1], block.label});
+                    open(inst.ops[1]);
+                    break;
+                case Op::OpVariable:
+                    if (!mask(p_.pointee(inst.type))) break;
+                    make_cell(inst.result);
+                    if (inst.ops.size() > 1)
+                        stored_.push_back({t_.entries.get(inst.result).cell - 1, inst.ops[1], block.label});
+                    break;
+                case Op::OpReturnValue: stored_.push_back({make_cell(function.id()), inst.ops[0], block.label}); break;
+                case Op::OpFunctionCall:
+                    for (size_t i = 1; i < inst.ops.size(); ++i) open(inst.ops[i]);
+                    break;
+                case Op::OpPhi:
+                    entry(inst.result).block = block.label;
+                    phis_.push_back(&inst);
+                    [[fallthrough]];
+                default:
+                    // Only pointers matter; conversions, arithmetic and comparisons take none.
+                    if (inst.op < Op::OpConvertFToU || inst.op > Op::OpBitCount || inst.op == Op::OpSelect)
+                        inst.for_each_id(open);
+                    break;
+            }
         }
     }
+    candidate_ends_.push_back(candidates_.size());
+}
+
+// What values are made of in live code: stores, phis' operands, and what keeps variables from being followed.
+// Code only ever dies, so equal numbers mean equal things.
+size_t BitAnalysis::count_live() const {
+    size_t live = 0;
+    for (const Stored& stored : stored_) live += !dead(stored.block);
+    for (const Opening& opening : openings_) live += !dead(opening.block);
+    for (const Inst* phi : phis_)
+        for (size_t i = 1; i < phi->ops.size(); i += 2) live += arrives(phi->ops[i], block_of(*phi));
+    return live;
+}
+
+// What each cell may hold, by the stores of live code; and from where settle starts.
+void BitAnalysis::place_values() {
+    for (Cell& cell : cells_) {
+        cell.count = 0;
+        cell.fixed = cell.given;
+    }
+    for (const Stored& stored : stored_)
+        if (!dead(stored.block)) ++cells_[stored.cell].count;
+    uint32_t place = 0;
+    for (Cell& cell : cells_) {
+        cell.first = place;
+        place += cell.count;
+        if (cell.given) continue;
+        const Inst* variable = def(cell.id);
+        const bool is_variable = variable && variable->op == Op::OpVariable;
+        const bool global_with_initializer = is_variable && !local(cell.id) && variable->ops.size() > 1;
+        cell.fixed = cell.count == 0 || global_with_initializer;
+    }
+    for (const Opening& opening : openings_)
+        if (!dead(opening.block)) cells_[opening.cell].fixed = true;
+    for (Cell& cell : cells_) {
+        cell.count = 0;
+        if (!cell.given) cell.bits = cell.fixed ? Bits{} : Bits{~0u, ~0u};
+    }
+    values_.resize(place);
+    for (const Stored& stored : stored_)
+        if (!dead(stored.block)) {
+            Cell& cell = cells_[stored.cell];
+            values_[cell.first + cell.count++] = stored.value;
+        }
 }
 
 // Starts from "everything is known", which no value satisfies, and takes away what a store does not keep.
 // What stays true in a whole round is true by induction over the stores.
 void BitAnalysis::settle() {
+    const size_t live = count_live() + 1;
+    if (live == live_) return;
+    live_ = live;
+    place_values();
     bool stable = false;
-    for (int round = 0; round < 16 && !stable; ++round) {
+    for (int round = 0; round < kMaxRounds && !stable; ++round) {
         stable = true;
         ++t_.epoch;
-        std::vector<Bits> next(cells_.size());
-        for (size_t i = 0; i < cells_.size(); ++i) {
-            next[i] = cells_[i].bits;
-            if (cells_[i].fixed) continue;
-            for (uint32_t k = 0; k < cells_[i].count; ++k) {
-                if (!(next[i].zeros | next[i].ones)) break;
-                next[i] = both(next[i], of(values_[cells_[i].first + k]));
-            }
-            stable &= next[i] == cells_[i].bits;
+        for (Cell& cell : cells_) {
+            if (cell.fixed) continue;
+            Bits bits = cell.bits;
+            for (uint32_t k = 0; k < cell.count && (bits.zeros | bits.ones); ++k)
+                bits = both(bits, of(values_[cell.first + k]));
+            stable &= bits == cell.bits;
+            cell.bits = bits;  // for the rest of the round already
         }
-        for (size_t i = 0; i < cells_.size(); ++i) cells_[i].bits = next[i];
     }
     bool given_up = false;
     for (Cell& one : cells_)
@@ -188,20 +219,25 @@ Bits BitAnalysis::find(Id id) {
     const Inst* inst = def(id);
     if (!inst || !inst->type) return {};
     const uint32_t all = mask(inst->type);
-    t_.known[id] = {{}, t_.epoch};  // while it is computed, nothing is known: never something wrong
+    auto know = [&](Bits bits) {
+        Tables::Entry& known = entry(id);
+        known.bits = bits;
+        known.epoch = t_.epoch;
+    };
+    know({});  // while it is computed, nothing is known: never something wrong
     if (!all) return {};
     ++depth_;
     Bits bits = compute(*inst);
     --depth_;
     bits.zeros &= all;
     bits.ones &= all;
-    t_.known[id] = {bits, t_.epoch};
+    know(bits);
     return bits;
 }
 
 Bits BitAnalysis::content(Id id) const {
-    const Tables::Index index = t_.cells.get(id);
-    return index.analysis == t_.analysis ? cells_[index.cell].bits : Bits{};
+    uint32_t cell;
+    return find_cell(id, cell) ? cells_[cell].bits : Bits{};
 }
 
 Bits BitAnalysis::compute(const Inst& inst) {
@@ -216,9 +252,15 @@ Bits BitAnalysis::compute(const Inst& inst) {
         case Op::OpLoad:
         case Op::OpFunctionCall: return content(inst.ops[0]);
         case Op::OpPhi: {
-            Bits bits = of(inst.ops[0]);
-            for (size_t i = 2; i < inst.ops.size(); i += 2) bits = both(bits, of(inst.ops[i]));
-            return bits;
+            Bits bits{~0u, ~0u};
+            bool any = false;
+            const Id here = block_of(inst);
+            for (size_t i = 0; i < inst.ops.size(); i += 2) {
+                if (!arrives(inst.ops[i + 1], here)) continue;
+                bits = both(bits, of(inst.ops[i]));
+                any = true;
+            }
+            return any ? bits : Bits{};
         }
         default: return operation(inst.op, inst.type, inst.ops.data(), inst.ops.size());
     }

@@ -30,28 +30,21 @@ class BitAnalysis {
       public:
         void reserve(ir::Id bound) {
             masks.reserve(bound);
-            defs.reserve(bound);
-            cells.reserve(bound);
-            known.reserve(bound);
+            entries.reserve(bound);
         }
 
       private:
         friend class BitAnalysis;
-        struct Def {
-            const ir::Inst* inst = nullptr;
-            uint32_t analysis = 0;
-        };
-        struct Known {
+        struct Entry {
+            const ir::Inst* inst = nullptr;  // of the functions that makes it
             Bits bits;
-            uint32_t epoch = 0;
-        };
-        struct Index {
-            uint32_t cell = 0, analysis = 0;
+            uint32_t epoch = 0;     // `bits` are of this one
+            uint32_t analysis = 0;  // the entry is of this one
+            uint32_t cell = 0;      // of a variable or function: in cells_, plus one
+            ir::Id block = 0;       // of a phi: where it stands
         };
         ir::IdMap<uint8_t> masks;  // 0: not looked at, 1: none, 2: of a bool, 3: of a 32-bit integer
-        ir::IdMap<Def> defs;
-        ir::IdMap<Index> cells;
-        ir::IdMap<Known> known;
+        ir::IdMap<Entry> entries;
         uint32_t epoch = 1, analysis = 0;
     };
 
@@ -61,7 +54,7 @@ class BitAnalysis {
     BitAnalysis(const ir::Program& program, const std::vector<const ir::Function*>& functions,
                 const std::map<ir::Id, Bits>& given, bool module_variables, Tables& tables);
     Bits of(ir::Id id) {
-        const Tables::Known& known = t_.known.get(id);
+        const Tables::Entry& known = t_.entries.get(id);
         return known.epoch == t_.epoch ? known.bits : find(id);
     }
     // All bits of the type: 1 for bool, ~0 for 32-bit integers, else 0.
@@ -72,7 +65,11 @@ class BitAnalysis {
     }
     // The instructions of a function (by its place among `functions`) whose value may have known bits, or be that
     // of an operand, in order.
-    std::span<const ir::Inst* const> candidates(size_t function) const {
+    struct Candidate {
+        const ir::Inst* inst;
+        ir::Id block;
+    };
+    std::span<const Candidate> candidates(size_t function) const {
         const size_t begin = function ? candidate_ends_[function - 1] : 0;
         return {candidates_.data() + begin, candidate_ends_[function] - begin};
     }
@@ -82,23 +79,58 @@ class BitAnalysis {
         return here ? here : p_.def(id);
     }
 
+    // ---- code that turns out not to run ----
+    // `block` always goes to `target`, whatever else its terminator names.
+    void take(ir::Id block, ir::Id target) { taken_[block] = target; }
+    ir::Id taken(ir::Id block) const { return taken_.get(block); }
+    // Nothing gets to `block`.
+    void bury(ir::Id block) { dead_.insert(block); }
+    bool dead(ir::Id block) const { return dead_.contains(block); }
+    // Whether `from`, which names `to`, may go there.
+    bool arrives(ir::Id from, ir::Id to) const {
+        const ir::Id only = taken_.get(from);
+        return !dead_.contains(from) && (!only || only == to);
+    }
+    // The block of a phi of the functions.
+    ir::Id block_of(const ir::Inst& phi) const { return t_.entries.get(phi.result).block; }
+    // Once more, with what has been said since: what is stored in dead blocks counts for nothing.
+    void settle();
+
   private:
     // A variable or a function's result: one of several values.
     struct Cell {
         ir::Id id = 0;
         uint32_t first = 0, count = 0;  // of values_
         Bits bits;
-        bool fixed = false;
+        bool given = false;
+        bool fixed = false;  // settle leaves its bits alone
+    };
+    struct Stored {
+        uint32_t cell;
+        ir::Id value, block;
+    };
+    struct Opening {
+        uint32_t cell;
+        ir::Id block;
     };
     const ir::Inst* local(ir::Id id) const {  // null for what is not of the functions
-        const Tables::Def& known = t_.defs.get(id);
+        const Tables::Entry& known = t_.entries.get(id);
         return known.analysis == t_.analysis ? known.inst : nullptr;
     }
+    Tables::Entry& entry(ir::Id id) {
+        Tables::Entry& known = t_.entries[id];
+        if (known.analysis != t_.analysis) {
+            known = {};
+            known.analysis = t_.analysis;
+        }
+        return known;
+    }
     uint8_t look_at(ir::Id type) const;
-    Cell& cell(ir::Id id) { return cells_[cell_of(id)]; }
-    uint32_t cell_of(ir::Id id);
-    void collect(const std::vector<const ir::Function*>& functions, bool module_variables);
-    void settle();
+    uint32_t make_cell(ir::Id id);
+    bool find_cell(ir::Id id, uint32_t& cell) const;
+    void collect(const ir::Function& function);
+    size_t count_live() const;
+    void place_values();
     Bits find(ir::Id id);
     Bits compute(const ir::Inst& inst);
     Bits operation(ir::Op op, ir::Id type, const uint32_t* ops, size_t count);
@@ -106,10 +138,16 @@ class BitAnalysis {
 
     const ir::Program& p_;
     Tables& t_;
-    std::vector<const ir::Inst*> candidates_;  // function by function
+    std::vector<Candidate> candidates_;  // function by function
     std::vector<size_t> candidate_ends_;
     std::vector<Cell> cells_;
-    std::vector<ir::Id> values_;  // what is stored, cell by cell
+    std::vector<Stored> stored_;
+    std::vector<Opening> openings_;  // where a variable is touched by more than whole loads and stores
+    std::vector<const ir::Inst*> phis_;
+    size_t live_ = 0;             // count_live() plus one when bits were settled
+    std::vector<ir::Id> values_;  // what live code stores, cell by cell
+    ir::IdSet dead_;
+    ir::IdMap<ir::Id> taken_;
     int depth_ = 0;
 };
 

@@ -17,12 +17,13 @@ using ir::Program;
 void specialize(ir::Module& module, const StageInput& stage, std::map<uint32_t, uint32_t>& used,
                 std::vector<SpecConstantReport>& report);
 
-// fold.cpp: constants, branches never taken and variables never read, in everything `main` reaches.
-// `given`: what loads of these variables give, whatever is stored; stores to those whose content is one
-// constant are dropped. remove_dead keeps words of a waiting ray (`save` calling `scratch_store`) only where
-// somebody reads their variable.
-void fold(Program& program, Id main, const std::map<Id, Bits>& given);
-void remove_dead(Program& program, Id main, Id save, Id scratch_store);
+// fold.cpp: constants and branches never taken, in everything `main` reaches; what it still reaches then, callees
+// first. `given`: what loads of these variables give, whatever is stored; stores to those whose content is one
+// constant are dropped.
+std::vector<ir::Function*> fold(Program& program, Id main, const std::map<Id, Bits>& given, BitAnalysis::Tables& tables);
+// dead.cpp: values, stores and calls that nobody needs. `functions`: all that runs, callees first. Words of a waiting
+// ray (`save` calling `scratch_store`) are kept only where somebody reads their variable.
+void remove_dead(Program& program, const std::vector<ir::Function*>& functions, Id save, Id scratch_store);
 
 // facts.cpp: what is known about a pipeline's rays and scene, see docs/specialisation.md.
 struct TraceFacts {

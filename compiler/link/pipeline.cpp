@@ -267,8 +267,8 @@ class Linker {
             given[machine_.variable("rtc_ray_sbt_stride")] = trace_facts_.stride;
             given[machine_.variable("rtc_ray_miss")] = trace_facts_.miss;
         }
-        link::fold(program_, main_, given);
-        link::remove_dead(program_, main_, machine_.function("rtc_trace_save"), machine_.function("rtc_scratch_store"));
+        const std::vector<ir::Function*> left = link::fold(program_, main_, given, bit_tables_);
+        link::remove_dead(program_, left, machine_.function("rtc_trace_save"), machine_.function("rtc_scratch_store"));
         report_unread();
     }
 

@@ -20,17 +20,17 @@ constexpr size_t kHeaderWords = 5;
 constexpr char kAlphabet[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
 std::string encode(const uint8_t* bytes, size_t size) {
-    std::string text;
-    text.reserve((size + 2) / 3 * 4);
-    for (size_t i = 0; i < size; i += 3) {
+    std::string text((size + 2) / 3 * 4, '=');
+    char* to = text.data();
+    for (size_t i = 0; i < size; i += 3, to += 4) {
         const size_t left = size - i;
         const uint32_t group = static_cast<uint32_t>(bytes[i]) << 16 |
                                (left > 1 ? static_cast<uint32_t>(bytes[i + 1]) << 8 : 0) |
                                (left > 2 ? static_cast<uint32_t>(bytes[i + 2]) : 0);
-        text += kAlphabet[group >> 18 & 63];
-        text += kAlphabet[group >> 12 & 63];
-        text += left > 1 ? kAlphabet[group >> 6 & 63] : '=';
-        text += left > 2 ? kAlphabet[group & 63] : '=';
+        to[0] = kAlphabet[group >> 18 & 63];
+        to[1] = kAlphabet[group >> 12 & 63];
+        if (left > 1) to[2] = kAlphabet[group >> 6 & 63];
+        if (left > 2) to[3] = kAlphabet[group & 63];
     }
     return text;
 }

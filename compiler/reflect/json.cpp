@@ -5,13 +5,14 @@
 #include <array>
 #include <cstdio>
 
+#include "reflect/json_writer.h"
 #include "reflect/reflection_io.h"
 #include "rtc/abi.h"
 
 namespace rtc {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Json = nlohmann::json;
 
 constexpr std::array kStageNames = {"rgen", "rint", "rahit", "rchit", "rmiss", "rcall"};
 constexpr std::array kAccuracies = {"watertight", "fast", "exact", "exact64"};
@@ -39,10 +40,14 @@ constexpr std::array kFlags = {Named{"resumable", RTC_MODULE_RESUMABLE},
                                Named{"addressMode", RTC_MODULE_ADDRESS_MODE},
                                Named{"checked", RTC_MODULE_CHECKED}};
 
+// At least eight digits.
 std::string hex(uint64_t value) {
-    char text[24];
-    std::snprintf(text, sizeof text, "0x%08llx", static_cast<unsigned long long>(value));
-    return text;
+    char digits[16];
+    const char* const end = std::to_chars(digits, digits + sizeof digits, value, 16).ptr;
+    const size_t count = static_cast<size_t>(end - digits);
+    std::string text = "0x";
+    if (count < 8) text.append(8 - count, '0');
+    return text.append(digits, count);
 }
 
 uint64_t from_hex(const Json& json) { return std::stoull(json.get<std::string>(), nullptr, 16); }
@@ -65,89 +70,117 @@ uint32_t spirv_version_from(const std::string& text) {
     return (major & 0xff) << 16 | (minor & 0xff) << 8;
 }
 
-Json stage_json(const StageReport& stage) {
-    return {{"name", stage.name},
-            {"kind", kStageNames.at(static_cast<size_t>(stage.kind))},
-            {"file", stage.file},
-            {"firstState", stage.first_state},
-            {"states", stage.states},
-            {"payloadWords", stage.payload_words},
-            {"recordBytes", stage.record_bytes}};
+void write(JsonWriter& out, const StageReport& stage) {
+    out.member("name", stage.name);
+    out.member("kind", kStageNames.at(static_cast<size_t>(stage.kind)));
+    out.member("file", stage.file);
+    out.member("firstState", stage.first_state);
+    out.member("states", stage.states);
+    out.member("payloadWords", stage.payload_words);
+    out.member("recordBytes", stage.record_bytes);
 }
 
-Json group_json(const GroupReport& group) {
-    Json handle = Json::array();
-    for (uint32_t word : group.handle) handle.push_back(hex(word));
-    return {{"name", group.name},
-            {"kind", kGroupNames.at(static_cast<size_t>(group.kind))},
-            {"handle", std::move(handle)}};
+void write(JsonWriter& out, const GroupReport& group) {
+    out.member("name", group.name);
+    out.member("kind", kGroupNames.at(static_cast<size_t>(group.kind)));
+    out.key("handle");
+    out.begin_array();
+    for (uint32_t word : group.handle) out.value(hex(word));
+    out.end_array();
 }
 
-Json resource_json(const ResourceReport& resource) {
-    return {{"name", resource.name},       {"stage", resource.stage}, {"set", resource.set},
-            {"binding", resource.binding}, {"type", resource.type},   {"arraySize", resource.array_size}};
+void write(JsonWriter& out, const ResourceReport& resource) {
+    out.member("name", resource.name);
+    out.member("stage", resource.stage);
+    out.member("set", resource.set);
+    out.member("binding", resource.binding);
+    out.member("type", resource.type);
+    out.member("arraySize", resource.array_size);
 }
 
-Json spec_constant_json(const SpecConstantReport& constant) {
-    return {{"stage", constant.stage}, {"name", constant.name}, {"originalId", constant.original_id},
-            {"id", constant.id},       {"type", constant.type}, {"default", hex(constant.default_value)}};
+void write(JsonWriter& out, const SpecConstantReport& constant) {
+    out.member("stage", constant.stage);
+    out.member("name", constant.name);
+    out.member("originalId", constant.original_id);
+    out.member("id", constant.id);
+    out.member("type", constant.type);
+    out.member("default", hex(constant.default_value));
 }
 
-Json trace_site_json(const TraceSiteReport& site) {
-    return {{"stage", site.stage},
-            {"file", site.file},
-            {"line", site.line},
-            {"call", site.callable ? "callable" : "trace"},
-            {"frameBytes", site.frame_bytes},
-            {"variables", site.variables}};
+void write(JsonWriter& out, const TraceSiteReport& site) {
+    out.member("stage", site.stage);
+    out.member("file", site.file);
+    out.member("line", site.line);
+    out.member("call", site.callable ? "callable" : "trace");
+    out.member("frameBytes", site.frame_bytes);
+    out.member("variables", site.variables);
 }
 
-Json fact_json(const FactReport& fact) {
-    return {{"name", fact.name}, {"state", fact.state}, {"detail", fact.detail}};
+void write(JsonWriter& out, const FactReport& fact) {
+    out.member("name", fact.name);
+    out.member("state", fact.state);
+    out.member("detail", fact.detail);
 }
 
-template <typename T, typename F>
-Json list(const std::vector<T>& items, F&& one) {
-    Json array = Json::array();
-    for (const T& item : items) array.push_back(one(item));
-    return array;
+template <typename T>
+void write_list(JsonWriter& out, const char* name, const std::vector<T>& items) {
+    out.key(name);
+    out.begin_array();
+    for (const T& item : items) {
+        out.begin_object();
+        write(out, item);
+        out.end_object();
+    }
+    out.end_array();
 }
 
-Json to_json(const Reflection& r) {
-    Json flags = Json::array();
+std::string to_json(const Reflection& r, bool pretty) {
+    JsonWriter out(pretty);
+    out.begin_object();
+    out.member("abiVersion", RTC_ABI_VERSION);
+    out.member("identity", hex(r.identity));
+    out.key("flags");
+    out.begin_array();
     for (const Named& flag : kFlags)
-        if (r.flags & flag.value) flags.push_back(flag.name);
-    Json bindings = Json::array();
-    for (const Named& binding : kBindings)
-        if (r.used_bindings >> binding.value & 1)
-            bindings.push_back({{"name", binding.name}, {"binding", r.reserved_binding + binding.value}});
-    return {
-        {"abiVersion", RTC_ABI_VERSION},
-        {"identity", hex(r.identity)},
-        {"flags", std::move(flags)},
-        {"spirvVersion", spirv_version_text(r.spirv_version)},
-        {"instructions", r.instruction_count},
-        {"states", r.state_count},
-        {"accuracy", accuracy_name(r.accuracy)},
-        {"maxRecursionDepth", r.max_recursion_depth},
-        {"maxCallableDepth", r.max_callable_depth},
-        {"stackWords", r.stack_words},
-        {"scratchWords", r.scratch_words},
-        {"payloadWords", r.payload_words},
-        {"attributeWords", r.attribute_words},
-        {"callableWords", r.callable_words},
-        {"pushConstantBytes", r.push_constant_bytes},
-        {"reserved",
-         {{"set", r.reserved_set}, {"binding", r.reserved_binding}, {"bindings", std::move(bindings)}}},
-        {"requiredFeatures", r.required_features},
-        {"stages", list(r.stages, stage_json)},
-        {"groups", list(r.groups, group_json)},
-        {"resources", list(r.resources, resource_json)},
-        {"specConstants", list(r.spec_constants, spec_constant_json)},
-        {"traceSites", list(r.trace_sites, trace_site_json)},
-        {"assumptions", assumption_names(r.assumptions)},
-        {"facts", list(r.facts, fact_json)},
-    };
+        if (r.flags & flag.value) out.value(flag.name);
+    out.end_array();
+    out.member("spirvVersion", spirv_version_text(r.spirv_version));
+    out.member("instructions", r.instruction_count);
+    out.member("states", r.state_count);
+    out.member("accuracy", accuracy_name(r.accuracy));
+    out.member("maxRecursionDepth", r.max_recursion_depth);
+    out.member("maxCallableDepth", r.max_callable_depth);
+    out.member("stackWords", r.stack_words);
+    out.member("scratchWords", r.scratch_words);
+    out.member("payloadWords", r.payload_words);
+    out.member("attributeWords", r.attribute_words);
+    out.member("callableWords", r.callable_words);
+    out.member("pushConstantBytes", r.push_constant_bytes);
+    out.key("reserved");
+    out.begin_object();
+    out.member("set", r.reserved_set);
+    out.member("binding", r.reserved_binding);
+    out.key("bindings");
+    out.begin_array();
+    for (const Named& binding : kBindings) {
+        if (!(r.used_bindings >> binding.value & 1)) continue;
+        out.begin_object();
+        out.member("name", binding.name);
+        out.member("binding", r.reserved_binding + binding.value);
+        out.end_object();
+    }
+    out.end_array();
+    out.end_object();
+    out.member("requiredFeatures", r.required_features);
+    write_list(out, "stages", r.stages);
+    write_list(out, "groups", r.groups);
+    write_list(out, "resources", r.resources);
+    write_list(out, "specConstants", r.spec_constants);
+    write_list(out, "traceSites", r.trace_sites);
+    out.member("assumptions", assumption_names(r.assumptions));
+    write_list(out, "facts", r.facts);
+    out.end_object();
+    return out.take();
 }
 
 Reflection from_json(const Json& json) {
@@ -254,16 +287,13 @@ const char* accuracy_name(Accuracy accuracy) { return kAccuracies.at(static_cast
 
 const char* group_kind_name(GroupKind kind) { return kGroupNames.at(static_cast<size_t>(kind)); }
 
-// Names come from SPIR-V, which may hold bytes that are no UTF-8: they become U+FFFD.
-std::string reflection_to_json(const Reflection& reflection) {
-    return to_json(reflection).dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
-}
+std::string reflection_to_json(const Reflection& reflection) { return to_json(reflection, true) + "\n"; }
 
 std::string embedded_json(const Reflection& reflection) {
     Reflection placeless = reflection;
     for (StageReport& stage : placeless.stages) stage.file = last_component(stage.file);
     for (TraceSiteReport& site : placeless.trace_sites) site.file = last_component(site.file);
-    return to_json(placeless).dump(-1, ' ', false, Json::error_handler_t::replace);
+    return to_json(placeless, false);
 }
 
 bool reflection_from_json(const std::string& json, Reflection& reflection, std::string& error) {

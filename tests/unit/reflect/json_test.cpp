@@ -46,6 +46,17 @@ TEST(Json, KeepsAnOrderAReaderCanDiff) {
     EXPECT_EQ(json.back(), '\n');
 }
 
+// The writer prints what the library would of the same values, in both forms.
+TEST(Json, IsWrittenAsTheLibraryWritesIt) {
+    rtc::Reflection r = sample_reflection();
+    r.stages[0].name = "quotes \" backslash \\ newline \n, \xc3\xa4 and no UTF-8: \xff";
+    r.resources.clear();
+    const std::string pretty = rtc::reflection_to_json(r), line = rtc::embedded_json(r);
+    EXPECT_EQ(nlohmann::ordered_json::parse(pretty).dump(2) + "\n", pretty);
+    EXPECT_EQ(nlohmann::ordered_json::parse(line).dump(), line);
+    EXPECT_THAT(line, HasSubstr("\\n, \xc3\xa4 and no UTF-8: \xef\xbf\xbd"));
+}
+
 TEST(Json, NamesTheReservedBindings) {
     const auto json = nlohmann::json::parse(rtc::reflection_to_json(sample_reflection()));
     ASSERT_EQ(json["reserved"]["bindings"].size(), 2u);
