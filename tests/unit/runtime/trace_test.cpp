@@ -427,6 +427,14 @@ TEST_F(ResumeTest, RowsAndDepth) {
     c.w = 45, c.h = 1, c.d = 3;
     run(c);
 }
+// More workgroups of 32 lanes than maxComputeWorkGroupCount[0] is sure to be: they go on in y.
+TEST_F(ResumeTest, BeyondOneRowOfWorkgroups) {
+    Run c;
+    c.w = 1024, c.h = 512, c.d = 5;
+    c.turns = 1, c.mask = 0, c.rounds = 1;
+    c.scratch = 4 * 1024 * 512 * 5;
+    run(c);
+}
 TEST_F(ResumeTest, SeveralLaunches) {
     Run c;
     c.launches = 3;

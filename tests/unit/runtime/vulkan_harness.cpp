@@ -116,20 +116,42 @@ std::unique_ptr<Vulkan> Vulkan::create(std::string& why) {
     // Address mode where the device has it. The instance is one of Vulkan 1.1, so it is an extension.
     RtrPhysicalDeviceSupport support;
     rtrGetPhysicalDeviceSupport(v->instance, v->physical_device, v->get_instance_proc_addr, &support);
-    const char* address_extension = "VK_KHR_buffer_device_address";
+    std::vector<const char*> wanted_extensions;
     VkPhysicalDeviceBufferDeviceAddressFeatures address{
         VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_BUFFER_DEVICE_ADDRESS_FEATURES};
     address.bufferDeviceAddress = VK_TRUE;
     if (support.addressMode && !getenv("RTC_TEST_NO_ADDRESSES")) {
         device.pNext = &address;
-        device.enabledExtensionCount = 1;
-        device.ppEnabledExtensionNames = &address_extension;
+        wanted_extensions.push_back("VK_KHR_buffer_device_address");
     }
+    // Update-after-bind likewise.
+    auto list_extensions = reinterpret_cast<PFN_vkEnumerateDeviceExtensionProperties>(
+        v->get_instance_proc_addr(v->instance, "vkEnumerateDeviceExtensionProperties"));
+    list_extensions(v->physical_device, nullptr, &count, nullptr);
+    std::vector<VkExtensionProperties> known(count);
+    list_extensions(v->physical_device, nullptr, &count, known.data());
+    VkPhysicalDeviceDescriptorIndexingFeatures indexing{
+        VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_DESCRIPTOR_INDEXING_FEATURES};
+    for (auto& e : known) {
+        if (strcmp(e.extensionName, "VK_EXT_descriptor_indexing") != 0) continue;
+        VkPhysicalDeviceFeatures2 features2{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, &indexing};
+        reinterpret_cast<PFN_vkGetPhysicalDeviceFeatures2>(
+            v->get_instance_proc_addr(v->instance, "vkGetPhysicalDeviceFeatures2"))(v->physical_device, &features2);
+        v->update_after_bind = indexing.descriptorBindingStorageBufferUpdateAfterBind;
+    }
+    if (v->update_after_bind) {
+        indexing = {VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_DESCRIPTOR_INDEXING_FEATURES, const_cast<void*>(device.pNext)};
+        indexing.descriptorBindingStorageBufferUpdateAfterBind = VK_TRUE;
+        device.pNext = &indexing;
+        wanted_extensions.push_back("VK_EXT_descriptor_indexing");
+    }
+    device.enabledExtensionCount = static_cast<uint32_t>(wanted_extensions.size());
+    device.ppEnabledExtensionNames = wanted_extensions.data();
     if (v->CreateDevice(v->physical_device, &device, nullptr, &v->device) != VK_SUCCESS) {
         why = "vkCreateDevice failed";
         return nullptr;
     }
-    if (device.pNext)
+    if (support.addressMode && !getenv("RTC_TEST_NO_ADDRESSES"))
         v->GetBufferDeviceAddress = reinterpret_cast<PFN_vkGetBufferDeviceAddress>(
             v->get_instance_proc_addr(v->instance, "vkGetBufferDeviceAddressKHR"));
     v->GetDeviceQueue(v->device, v->queue_family, 0, &v->queue);

@@ -61,6 +61,7 @@ class Vulkan {
     VkCommandBuffer cmd = VK_NULL_HANDLE;
     bool validation = false;
     PFN_vkGetBufferDeviceAddress GetBufferDeviceAddress = nullptr;  // null: no address mode here
+    bool update_after_bind = false;  // storage buffers can be
     std::vector<std::string> layer_messages;    // from the validation layers
     std::vector<std::string> runtime_messages;  // from the runtime: "id: text"
 
