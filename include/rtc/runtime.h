@@ -162,7 +162,9 @@ typedef struct RtrDeviceCreateInfo {
      * recording built or that rtrCmdDeclareScene names; the latter's references are looked at
      * again, for bottom levels that have been destroyed since. Updates that changed what is active are
      * told of likewise (BAD_UPDATE). Scratch of top levels then needs
-     * TRANSFER_DST, and launches more of the control region (rtrGetRecorderControlSize). */
+     * TRANSFER_DST, and launches more of the control region (rtrGetRecorderControlSize).
+     * Damage inside of structures is the module's to find: rtc --checked links a traversal that
+     * follows nothing it has not checked (launch error BAD_MEMORY). */
     VkBool32 validation;
     /* What `device` was created with, read during this call: a pipeline whose module needs a
      * feature or extension that is not in it is then refused by name. NULL: only what the
