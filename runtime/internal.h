@@ -374,6 +374,9 @@ typedef struct RtrModule {
     uint32_t storage_buffers, uniform_buffers, sampled_images, storage_images, samplers, input_attachments,
         total;
 } RtrModule;
+
+/* scopes.c: a copy of a module whose memory scopes are the subgroup's; NULL: out of memory. */
+uint32_t* rtr_narrow_scopes(const uint32_t* code, size_t* size, const VkAllocationCallbacks* allocator);
 VkResult rtr_parse_module(RtrDevice device, const uint32_t* code, size_t size,
                           const VkAllocationCallbacks* allocator, RtrModule* module);
 /* Features and extensions (features.c): what the device was created with, or (NULL) what the

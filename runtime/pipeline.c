@@ -165,6 +165,7 @@ static VkResult create_pipeline(RtrDevice d, VkPipelineCache cache,
     VkComputePipelineCreateInfo create = {.sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO};
     VkSpecializationInfo merged;
     VkShaderModule handle = VK_NULL_HANDLE;
+    uint32_t* narrowed = NULL;
     VkResult r = entries && data ? VK_SUCCESS : VK_ERROR_OUT_OF_HOST_MEMORY;
     uint32_t i;
     if (r == VK_SUCCESS) {
@@ -190,9 +191,17 @@ static VkResult create_pipeline(RtrDevice d, VkPipelineCache cache,
     if (r == VK_SUCCESS) {
         module.codeSize = info->codeSize;
         module.pCode = info->pCode;
+        if (d->support.needsResumableModules) { /* lavapipe before Mesa 24 */
+            narrowed = rtr_narrow_scopes(info->pCode, &module.codeSize, a);
+            module.pCode = narrowed;
+            if (!narrowed) r = VK_ERROR_OUT_OF_HOST_MEMORY;
+        }
+    }
+    if (r == VK_SUCCESS) {
         r = d->vk.CreateShaderModule(d->device, &module, a, &handle);
         if (r != VK_SUCCESS) rtr_error(d, r, "shader-module", "vkCreateShaderModule failed (VkResult %d)", r);
     }
+    rtr_free(a, narrowed);
     if (r == VK_SUCCESS) {
         create.flags = info->flags & ~(VkPipelineCreateFlags)VK_PIPELINE_CREATE_DEFER_COMPILE_BIT_NV;
         create.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;

@@ -136,3 +136,34 @@ case("resources/record-buffer-reference", {
      [expect("records that hold buffer pointers", 0, [12, 13])], section="seed: records as resource tables", scene=ONE_TRIANGLE,
      table={"hit": [{"group": "rchit", "data": [{"address": "0.2"}, {"u32": [k, 0]}]} for k in (2, 3)]},
      bindings={"0.2": {"u32": [10, 11, 12, 13]}})
+
+# Memory barriers, ordered atomics and coherent accesses in lanes that meet nowhere: some end, some trace, some loop.
+SCOPES = "GL_KHR_memory_scope_semantics"
+ORDERS = {
+    "memory-barriers": ("", (), "a[lane] = lane + 1u; memoryBarrier();", "memoryBarrierBuffer(); a[lane] += 10u; memoryBarrierImage();"),
+    "ordered-atomics": ("", (SCOPES,), "a[lane] = lane; uint old = atomicAdd(a[lane], 1u, gl_ScopeDevice, gl_StorageSemanticsBuffer, gl_SemanticsAcquireRelease);",
+                        "uint old = atomicAdd(a[lane], 10u, gl_ScopeDevice, gl_StorageSemanticsBuffer, gl_SemanticsAcquireRelease);"),
+    "scoped-barriers": ("", (SCOPES,), "a[lane] = lane + 1u; memoryBarrier(gl_ScopeDevice, gl_StorageSemanticsBuffer | gl_StorageSemanticsImage, gl_SemanticsAcquireRelease);",
+                        "memoryBarrier(gl_ScopeSubgroup, gl_StorageSemanticsBuffer, gl_SemanticsAcquireRelease); a[lane] += 10u;"),
+    "coherent-vulkan-model": ("devicecoherent ", (SCOPES,), "a[lane] = lane + 1u;", "a[lane] = a[lane] + 10u;"),
+}
+for name, (qualifier, extensions, before, inside) in ORDERS.items():
+    pragma = "#pragma use_vulkan_memory_model\n" if "vulkan" in name else ""
+    declared = pragma + f"layout(set = 0, binding = 2) {qualifier}buffer A {{ uint a[]; }};\n"
+    case(f"resources/{name}", {
+        "rgen": nv(P + declared + f"""void main() {{
+    uint lane = gl_LaunchIDNV.x;
+    if (lane % 5u == 4u) return;
+    {before}
+    for (uint i = 0u; i < lane % 3u; ++i) {{
+        p = lane;
+        traceNV(scene, 0, i == 0u ? 0xffu : 0u, 0, 0, 0, {RAY}, 0);
+    }}
+    r[lane] = a[lane];
+}}
+""", extensions=extensions),
+        "rchit": nv(IN + declared + f"void main() {{ uint lane = p; {inside} }}\n", scene=False, extensions=extensions),
+        "rmiss": nv(IN + declared + "void main() { a[p] += 100u; }\n", scene=False, extensions=extensions)},
+         [expect(f"{name.replace('-', ' ')} in lanes that end, trace or loop", 0,
+                 [UNTOUCHED if lane % 5 == 4 else lane + 1 + (0, 10, 110)[lane % 3] for lane in range(40)])],
+         section="issue 3 Memory scopes", scene=ONE_TRIANGLE, size=(40, 1, 1), bindings={"0.2": {"u32": [0] * 40}})
