@@ -56,7 +56,7 @@ Folded fold(const std::string& text) {
         }
     const std::vector<uint32_t> words = ir::write_module(m, false);
     f.text = ir::to_text(words);
-    f.problem = link::validate(words, 1, false);
+    f.problem = link::validate(words, 1);
     return f;
 }
 
