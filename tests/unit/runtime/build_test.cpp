@@ -190,7 +190,6 @@ TEST_P(BuildTest, ChainBelowAChainOfCodes) {
 // A fine mesh on a floor of two triangles. A tree that keeps as low as a Morton tree cannot keep the floor
 // apart from the mesh and costs half as much again.
 TEST_P(BuildTest, FloorDoesNotDragTheMeshAlong) {
-    if (GetParam()) GTEST_SKIP() << "a builder of good trees is meant";
     Scene scene(*vk, rtr, 16 << 20);
     std::vector<Vec3> vertices;
     for (float z : {-1.0f, 1.0f}) {
@@ -212,8 +211,9 @@ TEST_P(BuildTest, FloorDoesNotDragTheMeshAlong) {
     auto as = scene.build_bottom({scene.triangles(vertices)}, flags());
     TreeFacts facts;
     check_structure(scene, as, facts);
-    // 1.2 for the root and 2 for the floor are in any tree; the ball itself is 0.05 of the area.
-    EXPECT_LT(facts.sah, 4.2);
+    // 1.2 for the root and 2 for the floor are in any tree; the ball itself is 0.05 of the area. Without rotations
+    // the floor does: 18.5.
+    EXPECT_LT(facts.sah, GetParam() ? 20.0 : 4.2);
     if (getenv("RTC_PRINT")) printf("sah %.2f nodes %u depth %u\n", facts.sah, facts.nodes, facts.depth);
 }
 
