@@ -40,6 +40,19 @@ VkDeviceMemory allocate(const Context& context, const VkMemoryRequirements& need
     return memory;
 }
 
+// Drivers may take more than they can address, and lose the device later.
+void require_allocatable(const Context& context, VkDeviceSize bytes) {
+    VkPhysicalDeviceMaintenance3Properties limits{};
+    limits.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_3_PROPERTIES;
+    VkPhysicalDeviceProperties2 properties{};
+    properties.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2;
+    properties.pNext = &limits;
+    vkGetPhysicalDeviceProperties2(context.physical, &properties);
+    if (bytes > limits.maxMemoryAllocationSize)
+        throw Error("a buffer of " + std::to_string(bytes) + " bytes: maxMemoryAllocationSize is " +
+                    std::to_string(limits.maxMemoryAllocationSize));
+}
+
 constexpr VkImageAspectFlags kAspect = VK_IMAGE_ASPECT_COLOR_BIT;
 
 void transition(VkCommandBuffer commands, const Image& image, VkImageLayout from, VkImageLayout to) {
@@ -81,6 +94,7 @@ Buffer::Buffer(const Context& context, VkDeviceSize size_, VkBufferUsageFlags us
     check(vkCreateBuffer(device_, &info, nullptr, &handle), "vkCreateBuffer");
     VkMemoryRequirements needed{};
     vkGetBufferMemoryRequirements(device_, handle, &needed);
+    if (needed.size > 1u << 30) require_allocatable(context, needed.size);
     memory = allocate(context, needed, kind, addressable);
     check(vkBindBufferMemory(device_, handle, memory, 0), "vkBindBufferMemory");
     if (kind != MemoryKind::Device)
