@@ -33,9 +33,18 @@
 //   traversal's W d                  6u S
 //   together below 24u S |d|, so a ray that should leave sinks by at most 24u L |S| / |W^T n| within the
 //   triangle's extent, and starts higher by that.
-// Measured with `rtc-accuracy spawn` (docs/accuracy.md) in the tier watertight: no self-hits, but for triangles
-// thinner than about 1e-5 of their length, whose edge functions drown in rounding: their weights, and with them
-// t, come from anywhere along their length. `fast` has no bound on its t.
+// That t is off by 8u D holds for the point that the weights of an edge test name. The weights themselves come from
+// products of coordinates that are at most 2E (sheared, measured from the ray), 4E^2, whose roundings are 16u of them:
+// a weight is off by at most 64u E^2 / det, two weights move t by 128u E^3 / det along d.kz, and det is
+// |n . d| / |d.kz| with n = e1 x e2. The plane lies offset |d.kz| |n| / |n . d| behind the ray's start: the ray's
+// direction cancels, and
+//   offset >= 128u E^3 / |n|
+// more keeps the hit behind. For triangles thinner than 1/256 of their length, |n| < E^2 / 256, that is no longer
+// small against their width. Those are left sideways instead: the test decides exactly for corners moved by `slack`
+// (10u D in each direction, what p, o and d lose by rounding), so a ray whose whole line passes all three corners by
+// more than that misses them, whatever its t. The start moves along s, at right angles to the direction and to the
+// longest edge, until the line does pass: by the triangle's width as s sees it, and the slack.
+// Measured with `rtc-accuracy spawn` (docs/accuracy.md) in the tier watertight. `fast` has no bound on its t.
 #ifndef RTC_SPAWN_GLSL_
 #define RTC_SPAWN_GLSL_
 
@@ -43,6 +52,9 @@ struct RtcSpawn {
     vec3 position; // the hit point in world space
     vec3 normal; // unit, world space, on the side of (v1 - v0) x (v2 - v0)
     float offset; // how far an origin must be from `position` along the normal, either way
+    // Of thin triangles, else 0: corners less `position`, and how far traversal may see them from where they are.
+    vec3 corner0, corner1, corner2;
+    vec3 slack;
 };
 
 // a b - c d for factors that are sums of two floats, high and low.
@@ -119,16 +131,52 @@ RtcSpawn rtc_spawn(vec3 v0, vec3 v1, vec3 v2, vec2 barycentrics, mat4x3 object_t
     vec3 world_spread = (abs(object_to_world[0]) * spread.x + abs(object_to_world[1]) * spread.y) +
                         abs(object_to_world[2]) * spread.z;
     float sinking = 24.0 * u * (length(world_spread) * (length(sizes * shrink) * stretch));
+    vec3 corner_error = object_error + vec3(24.0 * u * max(max(spread.x, spread.y), spread.z));
+    float unit = size * scale; // 1 to 2: object_normal is n times scale^2
+    bool thin = dot(object_normal, object_normal) < unit * unit * unit * unit * 1.52587890625e-5; // 2^-16
+    float wobble = thin ? 0.0 : 128.0 * u * (unit * unit * size) * (shrink * stretch);
     // The bounds' own roundings are second order: 1 per cent holds them.
     s.offset = 1.01 * ((dot(world_error, abs(s.normal)) +
-                        dot(object_error, abs(object_normal)) * (shrink * stretch)) + sinking);
+                        dot(object_error, abs(object_normal)) * (shrink * stretch)) + (sinking + wobble));
+    s.corner0 = s.corner1 = s.corner2 = s.slack = vec3(0.0);
+    if (thin) {
+        vec3 w1 = (object_to_world[0] * e1.x + object_to_world[1] * e1.y) + object_to_world[2] * e1.z;
+        vec3 w2 = (object_to_world[0] * e2.x + object_to_world[1] * e2.y) + object_to_world[2] * e2.z;
+        s.corner0 = -(barycentrics.x * w1 + barycentrics.y * w2);
+        s.corner1 = s.corner0 + w1;
+        s.corner2 = s.corner0 + w2;
+        // Corners made so are off by less than 24u of the edges; the start is rounded once more.
+        vec3 edges = corner_error + 24.0 * u * spread;
+        s.slack = ((abs(object_to_world[0]) * edges.x + abs(object_to_world[1]) * edges.y) +
+                   abs(object_to_world[2]) * edges.z) + (world_error + 4.0 * u * abs(o));
+    }
     return s;
 }
 
 // The origin of a ray into `direction` (world space): off the surface, on that side.
 vec3 rtc_spawn_origin(RtcSpawn s, vec3 direction) {
-    float side = dot(direction, s.normal) < 0.0 ? -s.offset : s.offset;
-    return s.position + side * s.normal;
+    vec3 up = dot(direction, s.normal) < 0.0 ? -s.normal : s.normal;
+    vec3 origin = s.position + s.offset * up;
+    if (max(max(s.slack.x, s.slack.y), s.slack.z) > 0.0) {
+        vec3 d = direction * (1.0 / max(max(abs(direction.x), abs(direction.y)), abs(direction.z)));
+        d *= inversesqrt(dot(d, d));
+        vec3 first = s.corner1 - s.corner0, second = s.corner2 - s.corner1, third = s.corner0 - s.corner2;
+        vec3 along = dot(first, first) > dot(second, second) ? first : second;
+        along = dot(third, third) > dot(along, along) ? third : along;
+        float size = max(max(abs(along.x), abs(along.y)), abs(along.z));
+        // At right angles to d within a few u, also where d runs along the edge and the product is noise.
+        vec3 across = cross(d, along * (1.0 / size));
+        across = dot(across, across) > 1e-20 ? across * inversesqrt(dot(across, across)) : up;
+        across -= dot(across, d) * d;
+        across *= inversesqrt(dot(across, across));
+        across -= dot(across, d) * d;
+        across = dot(across, up) < 0.0 ? -across : across;
+        float width = max(max(dot(across, s.corner0), dot(across, s.corner1)), dot(across, s.corner2));
+        // 32u: d and `across` are not quite at right angles, and products round.
+        float reach = 1.9073486e-6 * size; // 32u
+        origin += across * (1.01 * (max(width, 0.0) + dot(abs(across), s.slack)) + 3.0 * reach);
+    }
+    return origin;
 }
 
 #endif // RTC_SPAWN_GLSL_

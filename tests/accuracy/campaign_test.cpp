@@ -151,6 +151,25 @@ TEST(Campaign, SpawnedRaysDoNotHitTheirTriangle) {
     EXPECT_GT(campaign("watertight", 2000, settings).events(true), 100u) << "the control must hit itself";
 }
 
+// Thin triangles leave sideways, others along the normal: both, and what lies between.
+TEST(Campaign, SpawnedRaysDoNotHitSliversOfAnyThinness) {
+    std::vector<CampaignPoint> points;
+    for (const CampaignPoint& point : spawn_points())
+        if (point.mesh.rfind("slivers", 0) == 0 && point.offset == 0 && point.transform == "identity") points.push_back(point);
+    ASSERT_GE(points.size(), 5u);
+    const auto context = campaign_context("watertight", "", true);
+    const auto tracer = make_campaign_tracer(*context, "watertight", CampaignProgram::Spawn, points, 4096);
+    CampaignSettings settings;
+    settings.program = CampaignProgram::Spawn;
+    settings.rays = 40000;
+    settings.quiet = true;
+    const CampaignReport report = run_campaign(*tracer, points, false, settings);
+    for (const CampaignRow& row : report.rows) {
+        EXPECT_EQ(row.events, 0u) << row.mesh << ' ' << row.aim;
+        EXPECT_LT(row.missed, row.rays * 3 / 4) << row.mesh << ' ' << row.aim;
+    }
+}
+
 TEST(Campaign, UnknownTierIsNamed) {
     try {
         campaign_context("waterproof", "", false);

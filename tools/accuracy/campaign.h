@@ -31,7 +31,7 @@ struct CampaignPoint {
 // 4 meshes x offsets 0, 1e1 ... 1e4 in the vertices and in the instance x identity, rotated, sheared and
 // mirrored; `beyond`: offsets 1e5 ... 1e8 instead.
 std::vector<CampaignPoint> campaign_points(bool beyond);
-// The former, and transforms that scale by 1e-6 to 1e6, stretch, and lie far away.
+// The former, transforms that scale by 1e-6 to 1e6, stretch, and lie far away, and slivers of 1e-1 to 1e-4.
 std::vector<CampaignPoint> spawn_points();
 // Binding 1 of the shaders for these points, whose shapes may be shared.
 std::vector<float> campaign_corners(const std::vector<CampaignPoint>& points);
@@ -52,7 +52,6 @@ class CampaignTracer {
 struct CampaignSettings {
     CampaignProgram program = CampaignProgram::Leaks;
     bool naive = false;         // spawn: second rays start where t says, as a control
-    bool slivers = false;       // spawn: slivers of 1e-6 are promised too, as tier exact does
     uint64_t rays = 1'000'000;  // for each aim, over all points within the promise
     uint64_t beyond = 0;        // the same, over all points beyond it
     double seconds = 0;         // stop each point's share in time for the whole to take this long; 0: no limit

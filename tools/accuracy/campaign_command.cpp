@@ -192,7 +192,6 @@ int campaign_command(CampaignProgram program, int argc, char** argv) {
         std::unique_ptr<tools::Context> context;
         CampaignReport report;
         try {
-            settings.slivers = tier == "exact" || tier == "exact64";
             context = campaign_context(tier, device, validate);
             const auto tracer = make_campaign_tracer(*context, tier, program, within, lanes);
             report = run_campaign(*tracer, within, false, settings);

@@ -34,7 +34,7 @@ struct CostRow {
     double turns_per_ray = 0;  // 0: not known
 };
 
-// Rays that leave surfaces (rtc/spawn.glsl) and hit the triangle that they leave; `thin`: of slivers of 1e-6.
+// Rays that leave surfaces (rtc/spawn.glsl) and hit the triangle that they leave; `thin`: of slivers.
 struct SelfHits {
     uint64_t rays = 0, hits = 0, thin_rays = 0, thin_hits = 0;
 };

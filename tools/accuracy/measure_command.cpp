@@ -91,7 +91,7 @@ SelfHits measure_self_hits(const tools::Context& context, const std::string& sub
     settings.quiet = true;
     SelfHits sum;
     for (const CampaignRow& row : run_campaign(*tracer, points, false, settings).rows) {
-        const bool thin = row.mesh == "slivers";
+        const bool thin = row.mesh.rfind("slivers", 0) == 0;
         (thin ? sum.thin_rays : sum.rays) += row.rays;
         (thin ? sum.thin_hits : sum.hits) += row.events;
     }
