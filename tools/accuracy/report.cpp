@@ -111,26 +111,32 @@ double Rate::bound() const {
 }
 
 std::vector<DeviceReport> summarise(const std::vector<Json>& runs) {
-    std::vector<DeviceReport> reports;
+    struct Merged {
+        std::string device;
+        bool by_cpu;
+        std::vector<Json> tiers;
+    };
+    std::vector<Merged> devices;
     for (const Json& run : runs) {
         if (!run.is_object() || !run.contains("device") || !run.contains("tiers"))
             throw std::runtime_error("not what rtc-accuracy --json writes: no \"device\" or no \"tiers\"");
         const std::string device = run.at("device");
-        auto report = std::find_if(reports.begin(), reports.end(), [&](const auto& r) { return r.device == device; });
-        if (report == reports.end()) {
-            reports.push_back({device, run.value("by_cpu", false), {}});
-            report = reports.end() - 1;
-        }
+        auto here = std::find_if(devices.begin(), devices.end(), [&](const Merged& d) { return d.device == device; });
+        if (here == devices.end()) here = devices.insert(here, {device, run.value("by_cpu", false), {}});
         for (const Json& tier : run.at("tiers")) {
-            Summary s = summary_of(tier);
-            auto& subjects = report->subjects;
-            auto same = std::find_if(subjects.begin(), subjects.end(), [&](const auto& x) { return x.name == s.name; });
-            if (same == subjects.end()) {
-                subjects.push_back(std::move(s));
+            auto same = std::find_if(here->tiers.begin(), here->tiers.end(),
+                                     [&](const Json& t) { return t.at("tier") == tier.at("tier"); });
+            if (same == here->tiers.end()) {
+                here->tiers.push_back(tier);
             } else {
-                *same = std::move(s);
+                same->update(tier);
             }
         }
+    }
+    std::vector<DeviceReport> reports;
+    for (const Merged& device : devices) {
+        reports.push_back({device.device, device.by_cpu, {}});
+        for (const Json& tier : device.tiers) reports.back().subjects.push_back(summary_of(tier));
     }
     return reports;
 }

@@ -40,8 +40,8 @@ struct DeviceReport {
     std::vector<Summary> subjects;
 };
 
-// Runs of one device become one report, in the order of the first that names it; a subject measured twice counts
-// once, as its last run has it. Throws std::runtime_error on what is not the laboratory's JSON.
+// Runs of one device become one report, in the order of the first that names it; of what was measured twice of a
+// subject the last run counts. Throws std::runtime_error on what is not the laboratory's JSON.
 std::vector<DeviceReport> summarise(const std::vector<nlohmann::ordered_json>& runs);
 
 // Names of subjects that another one beats or equals in cost and in every error measured of both, and beats in one.

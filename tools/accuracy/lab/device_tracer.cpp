@@ -79,7 +79,9 @@ struct DeviceTracer::State {
     VkDescriptorPool pool = VK_NULL_HANDLE;
     std::array<VkDescriptorSet, 2> sets{};
     VkBufferView view = VK_NULL_HANDLE;
-    tools::Buffer heap, params, empty, sbt, control, scratch, rays, results;
+    tools::Buffer heap, params, empty, sbt, control, scratch;
+    tools::Buffer rays, results;            // on the device, so that no bus is timed
+    tools::Buffer rays_here, results_here;  // on the host
     uint32_t root = 0;
     size_t capacity = 0;
 
@@ -244,7 +246,7 @@ std::vector<RayResult> DeviceTracer::trace(const std::vector<Ray>& rays) {
         dispatch(params, rays.data(), rays.size() * sizeof(Ray), lanes, lanes / 64, 1);
     }
     std::vector<RayResult> results(rays.size());
-    std::memcpy(results.data(), state_->results.mapped, results.size() * sizeof(RayResult));
+    std::memcpy(results.data(), state_->results_here.mapped, results.size() * sizeof(RayResult));
     return results;
 }
 
@@ -262,7 +264,7 @@ std::vector<uint32_t> DeviceTracer::probe(const std::vector<uint32_t>& params,
     }
     dispatch(params, indices.data(), indices.size() * 4, uint32_t(indices.size()), groups_x, groups_y);
     std::vector<uint32_t> results(indices.size() * kResultWords);
-    std::memcpy(results.data(), s.results.mapped, results.size() * 4);
+    std::memcpy(results.data(), s.results_here.mapped, results.size() * 4);
     return results;
 }
 
@@ -278,8 +280,11 @@ void DeviceTracer::dispatch(const std::vector<uint32_t>& params, const void* inp
         const VkBufferUsageFlags storage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
         const bool saves = s.options.resumable && s.options.step_budget != 0xffffffffu;
         const uint32_t save_words = s.options.variant == Variant::Probe ? 4 : (saves ? kSaveWords : 0);
-        s.rays = tools::Buffer(s.context, lanes * sizeof(Ray), storage, tools::MemoryKind::Host);
-        s.results = tools::Buffer(s.context, lanes * kResultWords * 4, storage, tools::MemoryKind::Readback);
+        const VkBufferUsageFlags in = VK_BUFFER_USAGE_TRANSFER_DST_BIT, out = VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
+        s.rays = tools::Buffer(s.context, lanes * sizeof(Ray), storage | in, tools::MemoryKind::Device);
+        s.rays_here = tools::Buffer(s.context, lanes * sizeof(Ray), out, tools::MemoryKind::Host);
+        s.results = tools::Buffer(s.context, lanes * kResultWords * 4, storage | out, tools::MemoryKind::Device);
+        s.results_here = tools::Buffer(s.context, lanes * kResultWords * 4, in, tools::MemoryKind::Readback);
         s.scratch = tools::Buffer(s.context, VkDeviceSize(lanes) * save_words * 4, storage,
                                   tools::MemoryKind::Device);
         s.write(1, 0, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, s.rays);
@@ -287,7 +292,7 @@ void DeviceTracer::dispatch(const std::vector<uint32_t>& params, const void* inp
         s.write(0, RTC_BINDING_SCRATCH, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, s.scratch);
         s.capacity = lanes;
     }
-    std::memcpy(s.rays.mapped, input, input_bytes);
+    std::memcpy(s.rays_here.mapped, input, input_bytes);
     std::memset(s.control.mapped, 0, kControlWords * 4);
     std::memcpy(s.params.mapped, params.data(), params.size() * 4);
     tools::GpuTimer timer(s.context);
@@ -296,9 +301,15 @@ void DeviceTracer::dispatch(const std::vector<uint32_t>& params, const void* inp
         vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, s.pipeline);
         vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, s.layout, 0, 2, s.sets.data(), 0,
                                 nullptr);
+        const VkBufferCopy in{0, 0, input_bytes};
+        vkCmdCopyBuffer(commands, s.rays_here.handle, s.rays.handle, 1, &in);
+        tools::full_barrier(commands);
         timer.begin(commands);
         vkCmdDispatch(commands, groups_x, groups_y, 1);
         timer.end(commands);
+        tools::full_barrier(commands);
+        const VkBufferCopy out{0, 0, VkDeviceSize(lanes) * kResultWords * 4};
+        vkCmdCopyBuffer(commands, s.results.handle, s.results_here.handle, 1, &out);
         tools::full_barrier(commands);
     });
     seconds = timer.seconds();
