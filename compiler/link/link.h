@@ -89,7 +89,7 @@ bool optimize(std::vector<uint32_t>& spirv, Optimization level, std::string& mes
 
 // partial.cpp: a finished module with stubs in place of its traversal functions, and back: `changed` is what
 // a tool that keeps ids made of the former.
-ir::Module without_traversal(ir::Module& module);
-ir::Module with_traversal(ir::Module changed, const ir::Module& original);
+ir::Module without_traversal(const ir::Module& module);
+ir::Module with_traversal(ir::Module changed, ir::Module original);
 
 }  // namespace rtc::link

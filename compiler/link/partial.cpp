@@ -1,45 +1,81 @@
 // SPIRV-Tools on what a pipeline brought, without traversal.
 //
 // Traversal functions are the same in every pipeline: they come cleaned up, and the tests of rtc validate them.
-// The optimiser and the validator see stubs in their place, which for a small pipeline saves most of their time.
+// The optimiser and the validator see stubs in place of those that the rest calls, and nothing of what only traversal
+// uses; for a small pipeline that saves most of their time.
 #include "link/link.h"
 
 namespace rtc::link {
+namespace {
 
-ir::Module without_traversal(ir::Module& module) {
-    // Bodies that are not there any more need no copy.
-    std::vector<ir::Function> functions;
-    functions.swap(module.functions);
-    ir::Module out = module;
-    functions.swap(module.functions);
-    Id void_type = 0;
-    for (const Inst& inst : out.globals)
-        if (inst.op == Op::OpTypeVoid) void_type = inst.result;
-    for (const ir::Function& whole : module.functions) {
-        if (!whole.prepared) {
-            out.functions.push_back(whole);
-            continue;
-        }
-        ir::Function function;
-        function.def = whole.def;
-        function.params = whole.params;
-        function.prepared = true;
-        ir::Block block;
-        block.label = whole.blocks.front().label;
-        if (function.def.type == void_type) {
-            block.insts.push_back(Inst(Op::OpReturn, 0, 0, {}));
-        } else {
-            const Id value = out.new_id();
-            block.insts.push_back(Inst(Op::OpUndef, function.def.type, value, {}));
-            block.insts.push_back(Inst(Op::OpReturnValue, 0, 0, {value}));
-        }
-        function.blocks.push_back(std::move(block));
-        out.functions.push_back(std::move(function));
+// The functions and variables that everything but traversal's bodies uses.
+ir::IdSet used_without_bodies(const ir::Module& module) {
+    ir::IdSet variables, used;
+    ir::IdMap<const ir::Function*> functions;
+    for (const Inst& inst : module.globals)
+        if (inst.op == Op::OpVariable) variables.insert(inst.result);
+    for (const ir::Function& function : module.functions) functions[function.id()] = &function;
+    for (const ir::Function& function : module.functions) {
+        if (function.prepared) continue;
+        used.insert(function.id());
+        for (const ir::Block& block : function.blocks)
+            for (const Inst& inst : block.insts)
+                inst.for_each_id([&](Id id) {
+                    if (functions.get(id) || variables.contains(id)) used.insert(id);
+                });
     }
-    // Decorations and names of code that is not there.
+    return used;
+}
+
+ir::Function stub_of(const ir::Function& whole, Id void_type, ir::Module& module) {
+    ir::Function function;
+    function.def = whole.def;
+    function.params = whole.params;
+    function.prepared = true;
+    ir::Block block;
+    block.label = whole.blocks.front().label;
+    if (function.def.type == void_type) {
+        block.insts.push_back(Inst(Op::OpReturn, 0, 0, {}));
+    } else {
+        const Id value = module.new_id();
+        block.insts.push_back(Inst(Op::OpUndef, function.def.type, value, {}));
+        block.insts.push_back(Inst(Op::OpReturnValue, 0, 0, {value}));
+    }
+    function.blocks.push_back(std::move(block));
+    return function;
+}
+
+}  // namespace
+
+ir::Module without_traversal(const ir::Module& module) {
+    const ir::IdSet used = used_without_bodies(module);
+    ir::Module out;
+    out.version = module.version;
+    out.bound = module.bound;
+    out.capabilities = module.capabilities;
+    out.extensions = module.extensions;
+    out.ext_imports = module.ext_imports;
+    out.addressing = module.addressing;
+    out.memory_model = module.memory_model;
+    out.entry_points = module.entry_points;
+    out.execution_modes = module.execution_modes;
+    out.files = module.files;
+    out.strings = module.strings;
+    for (ir::EntryPoint& entry : out.entry_points)
+        std::erase_if(entry.interface, [&](Id id) { return !used.contains(id); });
     ir::IdSet there;
-    for (const Inst& inst : out.globals) there.insert(inst.result);
-    for (const ir::Function& function : out.functions) {
+    Id void_type = 0;
+    // Types stay, used or not: a tool that misses one makes it, and then there would be two.
+    for (const Inst& inst : module.globals) {
+        if (inst.op == Op::OpVariable && !used.contains(inst.result)) continue;
+        if (inst.op == Op::OpTypeVoid) void_type = inst.result;
+        there.insert(inst.result);
+        out.globals.push_back(inst);
+    }
+    for (const ir::Function& whole : module.functions) {
+        if (!used.contains(whole.id())) continue;
+        out.functions.push_back(whole.prepared ? stub_of(whole, void_type, out) : whole);
+        const ir::Function& function = out.functions.back();
         there.insert(function.id());
         for (const Inst& inst : function.params) there.insert(inst.result);
         for (const ir::Block& block : function.blocks) {
@@ -47,36 +83,38 @@ ir::Module without_traversal(ir::Module& module) {
             for (const Inst& inst : block.insts) there.insert(inst.result);
         }
     }
-    auto is_gone = [&](const Inst& inst) { return !there.contains(inst.ops[0]); };
-    std::erase_if(out.decorations, is_gone);
-    std::erase_if(out.names, is_gone);
+    for (const Inst& inst : module.decorations)
+        if (there.contains(inst.ops[0])) out.decorations.push_back(inst);
+    for (const Inst& inst : module.names)
+        if (there.contains(inst.ops[0])) out.names.push_back(inst);
     return out;
 }
 
-ir::Module with_traversal(ir::Module changed, const ir::Module& original) {
+ir::Module with_traversal(ir::Module changed, ir::Module original) {
     // Ids below the original bound mean the same in both; tools only ever add ids above it, and may have
     // used ids that are free in the stubs' module alone for nothing that stays.
-    ir::IdSet there;
-    for (const Inst& inst : changed.globals) there.insert(inst.result);
-    std::vector<Inst> globals;
     ir::IdMap<uint32_t> place;  // in changed.globals, plus one
     for (size_t i = 0; i < changed.globals.size(); ++i)
         if (changed.globals[i].result) place[changed.globals[i].result] = static_cast<uint32_t>(i + 1);
-    for (const Inst& inst : original.globals) {
+    ir::IdSet known, restored;  // ids of the original, and those of them that the tool did not see or dropped
+    std::vector<Inst> globals;
+    globals.reserve(original.globals.size() + changed.globals.size());
+    for (Inst& inst : original.globals) {
         const uint32_t at = inst.result ? place.get(inst.result) : 0;
-        globals.push_back(at ? changed.globals[at - 1] : inst);
+        if (inst.result && !at) restored.insert(inst.result);
+        known.insert(inst.result);
+        globals.push_back(std::move(at ? changed.globals[at - 1] : inst));
     }
-    ir::IdSet known;
-    for (const Inst& inst : original.globals) known.insert(inst.result);
-    for (const Inst& inst : changed.globals)
-        if (inst.result && !known.contains(inst.result)) globals.push_back(inst);
+    for (Inst& inst : changed.globals)
+        if (inst.result && !known.contains(inst.result)) globals.push_back(std::move(inst));
     changed.globals = std::move(globals);
 
-    ir::IdMap<uint32_t> prepared;  // index in original.functions, plus one
-    for (size_t i = 0; i < original.functions.size(); ++i)
-        if (original.functions[i].prepared) prepared[original.functions[i].id()] = static_cast<uint32_t>(i + 1);
-    ir::IdSet kept;  // ids that `changed` still defines
-    for (ir::Function& function : changed.functions) {
+    ir::IdMap<ir::Function*> prepared;
+    for (ir::Function& function : original.functions)
+        if (function.prepared) prepared[function.id()] = &function;
+    ir::IdSet present, kept;  // functions that `changed` has; ids that it still defines
+    for (const ir::Function& function : changed.functions) {
+        present.insert(function.id());
         if (prepared.get(function.id())) continue;
         kept.insert(function.id());
         for (const Inst& inst : function.params) kept.insert(inst.result);
@@ -85,21 +123,10 @@ ir::Module with_traversal(ir::Module changed, const ir::Module& original) {
             for (const Inst& inst : block.insts) kept.insert(inst.result);
         }
     }
-    // The optimiser drops functions that only stubs' bodies would have called.
-    ir::IdSet present;
-    for (const ir::Function& function : changed.functions) present.insert(function.id());
-    std::vector<ir::Function> dropped;
-    for (const ir::Function& function : original.functions)
-        if (function.prepared && !present.contains(function.id())) dropped.push_back(function);
-    changed.functions.insert(changed.functions.begin(), dropped.begin(), dropped.end());
-
-    ir::IdSet restored;
-    for (const Inst& inst : original.globals)
-        if (inst.result && !there.contains(inst.result)) restored.insert(inst.result);
-    for (ir::Function& function : changed.functions) {
-        const uint32_t at = prepared.get(function.id());
-        if (!at) continue;
-        function = original.functions[at - 1];
+    std::vector<ir::Function> functions;
+    functions.reserve(original.functions.size());
+    auto restore = [&](ir::Function& function) {
+        restored.insert(function.id());
         for (const Inst& inst : function.params) restored.insert(inst.result);
         for (ir::Block& block : function.blocks) {
             restored.insert(block.label);
@@ -108,11 +135,26 @@ ir::Module with_traversal(ir::Module changed, const ir::Module& original) {
                 if (inst.result) restored.insert(inst.result);
             }
         }
-    }
-    std::erase_if(changed.decorations, [&](const Inst& inst) { return restored.contains(inst.ops[0]); });
-    for (const Inst& inst : original.decorations)
-        if (restored.contains(inst.ops[0]) && !kept.contains(inst.ops[0])) changed.decorations.push_back(inst);
-    changed.ext_imports = original.ext_imports;
+        functions.push_back(std::move(function));
+    };
+    // Functions that only stubs' bodies would have called come first.
+    for (ir::Function& function : original.functions)
+        if (function.prepared && !present.contains(function.id())) restore(function);
+    for (ir::Function& function : changed.functions)
+        if (ir::Function* whole = prepared.get(function.id()))
+            restore(*whole);
+        else
+            functions.push_back(std::move(function));
+    changed.functions = std::move(functions);
+
+    auto bring_back = [&](std::vector<Inst>& to, std::vector<Inst>& from) {
+        std::erase_if(to, [&](const Inst& inst) { return restored.contains(inst.ops[0]); });
+        for (Inst& inst : from)
+            if (restored.contains(inst.ops[0]) && !kept.contains(inst.ops[0])) to.push_back(std::move(inst));
+    };
+    bring_back(changed.decorations, original.decorations);
+    bring_back(changed.names, original.names);
+    changed.ext_imports = std::move(original.ext_imports);
     changed.bound = std::max(changed.bound, original.bound);
     return changed;
 }

@@ -404,7 +404,7 @@ class Linker {
         std::string message;
         if (!link::optimize(words, options_.optimize, message))
             ir::fail("optimizer", "", 0, "the optimiser failed: " + message);
-        program_.module = link::with_traversal(ir::read_module(words, "the optimised module"), program_.module);
+        program_.module = link::with_traversal(ir::read_module(words, "the optimised module"), std::move(program_.module));
         program_.reindex();
         link::tidy(program_, {program_.module.entry_points[0].function});
         link::declare_interface(program_.module);
