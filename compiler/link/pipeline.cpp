@@ -196,6 +196,7 @@ class Linker {
         link::unify_resources(program_, stage, resources_, result_.reflection);
         // Last before the split: earlier passes may still move values between blocks.
         lower::to_memory_form(program_, stage, kinds_);
+        lower::select_elements(program_, stage);
         if (machine_.resumable) lower::count_loops(program_, stage, machine_);
         link::collect_trace_facts(program_, stage, trace_facts_, bit_tables_);
 

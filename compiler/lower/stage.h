@@ -91,6 +91,9 @@ void lower_records(Program& program, Stage& stage, continuation::Machine& machin
 // memory.cpp: every call ends its block, no phi is left, and no value is used outside the block that makes it.
 void to_memory_form(Program& program, Stage& stage, const CallKinds& kinds);
 
+// indices.cpp: computed indices into small variables become selections. Needs memory form, and keeps it.
+void select_elements(Program& program, Stage& stage);
+
 // loops.cpp: counts loop iterations against the step budget. A short loop has a small constant trip count.
 bool is_short_loop(const Program& program, const Function& function, const Block& header);
 bool has_long_loop(const Program& program, const Function& function);

@@ -189,5 +189,27 @@ TEST(Language, LinesSurviveAndDebugInstructionsDoNotDisturb) {
     EXPECT_EQ(bare.dump.find("OpLine"), std::string::npos);
 }
 
+// NVIDIA's compiler crashes on some machines that write small arrays by a computed index: testdata/driver-cases.
+TEST(Language, ComputedIndicesIntoSmallArraysAreSelections) {
+    auto selections = [](const char* length, const char* operands) {
+        const std::string globals = std::string(kPayload) + "%n = OpConstant %uint " + length +
+                                    "\n%array = OpTypeArray %float %n\n%parray = OpTypePointer Private %array\n"
+                                    "%pelement = OpTypePointer Private %float\n%values = OpVariable %parray Private\n"
+                                    "%pindex = OpTypePointer Private %uint\n%where = OpVariable %pindex Private\n";
+        const std::string body = "%index = OpLoad %uint %where\n%at = OpAccessChain %pelement %values %index\n"
+                                 "OpStore %at %float_0 " + std::string(operands) + "\n%there = OpLoad %float %at " + operands + "\n";
+        LinkOptions options;
+        options.specialize = false;
+        const LinkResult result =
+            link({{StageKind::RayGen, assemble(raygen_text(globals, body + kTrace, kPayloadLocation))}}, options);
+        expect_valid(result);
+        return count(ir::to_text(result.spirv), "OpSelect %float ");
+    };
+    const size_t none = selections("9", "");
+    EXPECT_EQ(selections("8", ""), none + 8 + 7);  // a store, a load
+    EXPECT_EQ(selections("3", ""), none + 3 + 2);
+    EXPECT_EQ(selections("3", "Volatile"), none);
+}
+
 }  // namespace
 }  // namespace rtc::test
