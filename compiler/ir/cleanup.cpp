@@ -1,5 +1,6 @@
 #include "ir/cleanup.h"
 
+#include <algorithm>
 #include <map>
 
 namespace rtc::ir {
@@ -285,6 +286,55 @@ void merge_blocks(Function& function) {
             if (inst.op != Op::OpPhi) break;
             for (size_t k = 1; k < inst.ops.size(); k += 2) inst.ops[k] = holder(inst.ops[k]);
         }
+}
+
+void split_nested_inserts(Program& program, Function& function) {
+    for (Block& block : function.blocks) {
+        const bool any = std::any_of(block.insts.begin(), block.insts.end(), [](const Inst& inst) {
+            return inst.op == Op::OpCompositeInsert && inst.ops.size() > 3;
+        });
+        if (!any) continue;
+        std::vector<Inst> out;
+        out.reserve(block.insts.size() + 8);
+        for (Inst& inst : block.insts) {
+            if (inst.op != Op::OpCompositeInsert || inst.ops.size() <= 3) {
+                out.push_back(std::move(inst));
+                continue;
+            }
+            // From the whole down to the part that changes, and up again.
+            std::vector<Inst> whole{Inst(Op::OpCopyObject, inst.type, inst.ops[1], {})};
+            for (size_t i = 2; i + 1 < inst.ops.size(); ++i) {
+                const Inst& outer = whole.back();
+                Inst part(Op::OpCompositeExtract, program.element_type(outer.type, inst.ops[i]),
+                          program.module.new_id(), {outer.result, inst.ops[i]});
+                part.source = inst.source;
+                out.push_back(part);
+                whole.push_back(std::move(part));
+            }
+            Id value = inst.ops[0];
+            for (size_t level = whole.size(); level-- > 0;) {
+                Inst changed(Op::OpCompositeInsert, whole[level].type, level ? program.module.new_id() : inst.result,
+                             {value, whole[level].result, inst.ops[2 + level]});
+                changed.source = inst.source;
+                value = changed.result;
+                out.push_back(std::move(changed));
+            }
+        }
+        block.insts = std::move(out);
+    }
+}
+
+bool stores_deep(const Function& function) {
+    IdSet variables, deep;
+    for (const Inst& inst : function.blocks.front().insts)
+        if (is_function_variable(inst)) variables.insert(inst.result);
+    for (const Block& block : function.blocks)
+        for (const Inst& inst : block.insts) {
+            const bool chain = inst.op == Op::OpAccessChain || inst.op == Op::OpInBoundsAccessChain;
+            if (chain && inst.ops.size() > 2 && variables.contains(inst.ops[0])) deep.insert(inst.result);
+            if (inst.op == Op::OpStore && deep.contains(inst.ops[0])) return true;
+        }
+    return false;
 }
 
 void clean_up(const Program& program, Function& function) {

@@ -19,7 +19,13 @@ void remove_dead_code(Function& function);
 // A block that ends in a plain branch to a block nothing else branches to or names takes it in.
 void merge_blocks(Function& function);
 
-// All of the above.
+// An insertion deep into a composite becomes one for each level.
+void split_nested_inserts(Program& program, Function& function);
+
+// Whether something is stored two levels deep or deeper into a local variable.
+bool stores_deep(const Function& function);
+
+// All of the above that remove something.
 void clean_up(const Program& program, Function& function);
 
 }  // namespace rtc::ir

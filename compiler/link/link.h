@@ -85,7 +85,8 @@ std::vector<std::string> required_features(const ir::Module& module);
 // tools.cpp: SPIRV-Tools as a validator and an optimiser. Empty string: valid.
 std::string validate(const std::vector<uint32_t>& spirv, uint32_t vulkan_minor);
 std::string validate_input(const ir::Module& module);  // a stage's
-bool optimize(std::vector<uint32_t>& spirv, Optimization level, std::string& message);
+// `chains`: stores to parts of local variables become insertions into the whole.
+bool optimize(std::vector<uint32_t>& spirv, Optimization level, bool chains, std::string& message);
 
 // partial.cpp: a finished module with stubs in place of its traversal functions, and back: `changed` is what
 // a tool that keeps ids made of the former.

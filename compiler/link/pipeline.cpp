@@ -398,12 +398,19 @@ class Linker {
 
     // SPIRV-Tools' optimiser on everything but traversal.
     void optimize() {
-        for (ir::Function& function : program_.module.functions)
-            if (!function.prepared) ir::clean_up(program_, function);
+        // SPIRV-Tools 2023.1 crashes where it simplifies insertions deep into composites (its issue 4953), and makes
+        // them itself of deep stores.
+        bool deep = false;
+        for (ir::Function& function : program_.module.functions) {
+            if (function.prepared) continue;
+            ir::clean_up(program_, function);
+            ir::split_nested_inserts(program_, function);
+            deep |= ir::stores_deep(function);
+        }
         std::vector<uint32_t> words =
             ir::write_module(link::without_traversal(program_.module), options_.debug_info);
         std::string message;
-        if (!link::optimize(words, options_.optimize, message))
+        if (!link::optimize(words, options_.optimize, !deep, message))
             ir::fail("optimizer", "", 0, "the optimiser failed: " + message);
         program_.module = link::with_traversal(ir::read_module(words, "the optimised module"), std::move(program_.module));
         program_.reindex();

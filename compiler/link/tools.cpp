@@ -52,7 +52,7 @@ std::string validate_input(const ir::Module& module) {
     return validate_in(ir::write_module(known, false), SPV_ENV_VULKAN_1_3);
 }
 
-bool optimize(std::vector<uint32_t>& spirv, Optimization level, std::string& message) {
+bool optimize(std::vector<uint32_t>& spirv, Optimization level, bool chains, std::string& message) {
     spvtools::Optimizer optimizer(SPV_ENV_VULKAN_1_3);
     optimizer.SetMessageConsumer([&](spv_message_level_t severity, const char*, const spv_position_t&, const char* text) {
         if (severity <= SPV_MSG_ERROR && message.empty()) message = text;
@@ -61,7 +61,7 @@ bool optimize(std::vector<uint32_t>& spirv, Optimization level, std::string& mes
     // variables into phis of its loops: quadratic in the states, and drivers do it anyway.
     // Nothing here touches NoContraction, reorders float operations or renumbers ids (see partial.cpp).
     // Constant branches, known loads, dead code and short blocks are gone already (ir/cleanup.h).
-    optimizer.RegisterPass(spvtools::CreateLocalAccessChainConvertPass());
+    if (chains) optimizer.RegisterPass(spvtools::CreateLocalAccessChainConvertPass());
     optimizer.RegisterPass(spvtools::CreateLocalSingleBlockLoadStoreElimPass());
     optimizer.RegisterPass(spvtools::CreateSimplificationPass());
     if (level == Optimization::Performance) optimizer.RegisterPass(spvtools::CreateLocalRedundancyEliminationPass());

@@ -11,15 +11,18 @@ namespace {
 // A response file that names itself must end somewhere.
 constexpr int kMaxNesting = 10;
 
-std::vector<std::string> split(const std::string& text) {
+std::vector<std::string> split(const std::string& text, const std::string& file) {
     std::vector<std::string> words;
     std::string word;
     bool inside = false;
     char quote = '\0';
+    size_t line = 1, opened = 0;  // where the quote began
     for (size_t i = 0; i < text.size(); ++i) {
         const char c = text[i];
+        if (c == '\n') ++line;
         if (c == '\\' && quote != '\'' && i + 1 < text.size()) {
             word += text[++i];
+            if (text[i] == '\n') ++line;
             inside = true;
         } else if (quote) {
             if (c == quote)
@@ -28,6 +31,7 @@ std::vector<std::string> split(const std::string& text) {
                 word += c;
         } else if (c == '"' || c == '\'') {
             quote = c;
+            opened = line;
             inside = true;
         } else if (std::isspace(static_cast<unsigned char>(c))) {
             if (inside) words.push_back(word);
@@ -38,6 +42,9 @@ std::vector<std::string> split(const std::string& text) {
             inside = true;
         }
     }
+    if (quote)
+        throw UsageError(file + ":" + std::to_string(opened) + ": error: a quote (" + quote +
+                         ") that begins here is not closed");
     if (inside) words.push_back(word);
     return words;
 }
@@ -52,7 +59,7 @@ void expand(const std::vector<std::string>& words, int nesting, std::vector<std:
         std::ifstream stream(word.substr(1), std::ios::binary);
         if (!stream) throw UsageError("cannot open response file: '" + word.substr(1) + "'");
         const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-        expand(split(text), nesting + 1, out);
+        expand(split(text, word.substr(1)), nesting + 1, out);
     }
 }
 

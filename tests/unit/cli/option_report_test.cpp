@@ -179,6 +179,10 @@ TEST_F(Report, ResponseFileMistakes) {
     run = rtc("@loop.rsp");
     EXPECT_EQ(run.status, 1);
     EXPECT_THAT(run.err, HasSubstr("nested too deeply"));
+    write("open.rsp", "camera.rgen\n'my files.rmiss' \\\n -o \"never closed.spv\n-O0\n");
+    run = rtc("@open.rsp");
+    EXPECT_EQ(run.status, 1);
+    EXPECT_THAT(run.err, HasSubstr("open.rsp:3: error: a quote (\") that begins here is not closed"));
 }
 
 }  // namespace
