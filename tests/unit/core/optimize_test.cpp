@@ -9,16 +9,20 @@ namespace rtc::test {
 namespace {
 
 const char* const kNested =
-    "%uint_1 = OpConstant %uint 1\n%inner = OpTypeStruct %float %float\n%outer = OpTypeStruct %float %inner\n"
+    "%uint_1 = OpConstant %uint 1\n%uint_2 = OpConstant %uint 2\n%inner = OpTypeStruct %float %float\n"
+    "%list = OpTypeArray %inner %uint_2\n%outer = OpTypeStruct %float %list\n"
     "%ptr_outer = OpTypePointer Function %outer\n%ptr_part = OpTypePointer Function %float\n";
 
-// A nested struct, stored to member by member: SPIRV-Tools 2023.1 crashes on what it makes of these stores itself.
+// An array of structs in a struct, stored to member by member: SPIRV-Tools 2023.1 crashes on what it makes of these
+// stores itself.
 const char* const kStores =
     "%v = OpVariable %ptr_outer Function\n"
     "%p0 = OpAccessChain %ptr_part %v %uint_0\nOpStore %p0 %float_0\n"
-    "%p1 = OpAccessChain %ptr_part %v %uint_1 %uint_0\nOpStore %p1 %float_1\n"
-    "%p2 = OpAccessChain %ptr_part %v %uint_1 %uint_1\nOpStore %p2 %float_0\n"
-    "%w = OpLoad %outer %v\n%x = OpCompositeExtract %float %w 1 0\nOpStore %payload %x\n";
+    "%p1 = OpAccessChain %ptr_part %v %uint_1 %uint_0 %uint_0\nOpStore %p1 %float_1\n"
+    "%p2 = OpAccessChain %ptr_part %v %uint_1 %uint_1 %uint_0\nOpStore %p2 %float_1\n"
+    "%p3 = OpAccessChain %ptr_part %v %uint_1 %uint_0 %uint_1\nOpStore %p3 %float_0\n"
+    "%p4 = OpAccessChain %ptr_part %v %uint_1 %uint_1 %uint_1\nOpStore %p4 %float_0\n"
+    "%w = OpLoad %outer %v\n%x = OpCompositeExtract %float %w 1 0 0\nOpStore %payload %x\n";
 
 TEST(Optimize, NestedStructsStoredMemberByMember) {
     for (Optimization level : {Optimization::Performance, Optimization::Size}) {
