@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <limits>
+
 #include "cases.h"
 #include "embree_tracer.h"
 #include "leaks.h"
@@ -118,6 +121,24 @@ TEST(Embree, SeesWhatRtcSees) {
         }
     }
     EXPECT_GT(tracer->scene_bytes(), sphere.triangles.size() * 20);
+}
+
+TEST(Embree, RaysThatItCannotTakeMiss) {
+    if (!have_embree()) GTEST_SKIP() << "built without Embree";
+    const IndexedMesh sphere = make_icosphere(1);
+    const auto tracer = make_embree_tracer(EmbreeMode::Fast, 1);
+    Instance instance;
+    instance.object_to_world = {{{1e-30f, 0, 0, 0}, {0, 1e-30f, 0, 0}, {0, 0, 1e-30f, 0}}};
+    for (const bool scaled : {false, true}) {
+        tracer->set_scene(build_scene({Blas{{{sphere.soup(), {}, true}}}}, {scaled ? instance : Instance{}}));
+        for (const float x : {1e30f, std::numeric_limits<float>::infinity(), std::nanf("")}) {
+            Ray ray;
+            ray.origin = {0, 0, 3};
+            ray.direction = {x, 0, -1};
+            ray.tmax = 10;
+            EXPECT_EQ(tracer->trace({ray}).at(0).instance, kNoInstance);
+        }
+    }
 }
 
 }  // namespace

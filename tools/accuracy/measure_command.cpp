@@ -273,13 +273,18 @@ int measure_command(int argc, char** argv) {
             if (subjects[i]) costs.push_back({&subjects[i]->cost(), &reports[i], subjects[i]->by_cpu()});
         measure_cost(costs, settings.cost_rays, settings.repeats);
     }
+    auto results = [&] {
+        Json json{{"device", device.empty() ? "the host" : device}, {"by_cpu", by_cpu}};
+        for (const Report& report : reports) json["tiers"].push_back(to_json(report));
+        return json;
+    };
     for (size_t i = 0; i < tiers.size(); ++i) {
         if (!settings.quiet) std::fprintf(stderr, "%s ...\n", tiers[i].c_str());
         attempt(i, [&] { measure(*subjects[i], reports[i], settings); });
         good = verdict(reports[i]) && good;
+        if (!json_path.empty()) write_file(json_path, results().dump(1) + "\n");  // long runs get interrupted
     }
-    Json json{{"device", device.empty() ? "the host" : device}, {"by_cpu", by_cpu}};
-    for (const Report& report : reports) json["tiers"].push_back(to_json(report));
+    const Json json = results();
     const DeviceReport summary = summarise({json}).at(0);
     const std::string table = markdown_table(summary, "");
     std::fputs(table.c_str(), stdout);

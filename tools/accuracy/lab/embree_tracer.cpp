@@ -10,6 +10,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstring>
 #endif
 
@@ -112,6 +113,12 @@ class EmbreeTracer final : public RayTracer {
             rtcCommitScene(top_);
         }
         scene_bytes_ = uint64_t(bytes_ - before);
+        stretch_ = shift_ = 0;
+        for (const Transform& m : scene.world_to_object)
+            for (const auto& row : m) {
+                stretch_ = std::max(stretch_, std::fabs(double(row[0])) + std::fabs(double(row[1])) + std::fabs(double(row[2])));
+                shift_ = std::max(shift_, std::fabs(double(row[3])));
+            }
     }
 
     std::vector<RayResult> trace(const std::vector<Ray>& rays) override {
@@ -139,8 +146,25 @@ class EmbreeTracer final : public RayTracer {
         return scene;
     }
 
+    // Embree asserts that rays, also those of instances, stay below this; others miss here.
+    bool valid(const Ray& ray) const {
+        double origin = 0, direction = 0;
+        for (int i = 0; i < 3; ++i) {
+            origin = std::max(origin, std::fabs(double(ray.origin[i])));
+            direction = std::max(direction, std::fabs(double(ray.direction[i])));
+        }
+        const double limit = 1.8e18;
+        return std::isfinite(ray.origin.x + ray.origin.y + ray.origin.z) &&
+               std::isfinite(ray.direction.x + ray.direction.y + ray.direction.z) && !std::isnan(ray.tmin) &&
+               !std::isnan(ray.tmax) && std::max(1.0, stretch_) * origin + shift_ < limit &&
+               std::max(1.0, stretch_) * direction < limit;
+    }
+
     void trace_one(RTCScene scene, const Ray& ray, RayResult& result) {
         std::memset(&result, 0, sizeof result);
+        result.t = ray.tmax;
+        result.instance = kNoInstance;
+        if (!valid(ray)) return;
         Context context;
         rtcInitIntersectContext(&context.embree);
         context.result = &result;
@@ -185,6 +209,7 @@ class EmbreeTracer final : public RayTracer {
     RTCScene top_ = nullptr;
     bool direct_ = false;
     uint64_t scene_bytes_ = 0;
+    double stretch_ = 0, shift_ = 0;  // of directions and origins on the way into an instance, at most
 };
 
 }  // namespace
