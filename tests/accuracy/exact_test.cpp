@@ -81,7 +81,7 @@ TEST_P(Exact, AgreesWithExactArithmeticOnEveryAxis) {
     TracerOptions options;
     options.variant = variant;
     options.aabbs = options.any_hit = aabbs;
-    options.step_budget = 6000;
+    options.step_budget = 7000;
     options.pause = true;
     DeviceTracer tracer(test_context(), options);
     uint64_t hits = 0, ties = 0, edges = 0;

@@ -102,7 +102,7 @@ int agree_command(int argc, char** argv) {
     for (const std::string& tier : tiers) {
         TracerOptions options;
         options.variant = parse_variant(tier);
-        options.step_budget = 6000;
+        options.step_budget = 7000;
         options.pause = true;
         options.aabbs = options.any_hit = false;  // the cases are opaque triangles: the way most pipelines go
         if (DeviceTracer::needs_float64(options.variant) && !context.features.shaderFloat64) {

@@ -61,7 +61,7 @@ class Subject {
         lean.any_hit = lean.resumable = false;
         cost_ = std::make_unique<DeviceTracer>(*context_, lean);
         // Lavapipe 22.3 ends loops of many turns.
-        options.step_budget = 6000;
+        options.step_budget = 7000;
         options.pause = true;
         counting_ = std::make_unique<DeviceTracer>(*context_, options);
         options.any_hit = false;
