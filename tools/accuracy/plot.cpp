@@ -71,7 +71,7 @@ void draw(std::string& out, const Panel& panel, double left, double x_low, doubl
         y_high = std::max(y_high, m.y);
     }
     if (panel.marks.empty()) y_low = y_high = 1;
-    const int first = int(std::floor(std::log10(y_low) - 0.15)), last = int(std::ceil(std::log10(y_high) + 0.15));
+    const int first = int(std::floor(std::log10(y_low) - 0.15)), last = int(std::ceil(std::log10(y_high) + 0.45));
     auto at_x = [&](double v) { return left + kPanel * std::log(v / x_low) / std::log(x_high / x_low); };
     auto at_y = [&](double v) { return kTop + kHeight * (double(last) - std::log10(v)) / double(last - first); };
     add(out, "<rect x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\" fill=\"#fafafa\" stroke=\"#999\"/>\n", left, kTop,

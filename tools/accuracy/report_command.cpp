@@ -1,4 +1,5 @@
 // rtc-accuracy report: tables and plots from the JSON of earlier runs, merged by device.
+#include <algorithm>
 #include <fstream>
 
 #include "command_line.h"
@@ -32,8 +33,11 @@ int report_command(int argc, char** argv) {
     int number = 0;
     for (const DeviceReport& report : summarise(runs)) {
         std::string name;
-        if (!plot_prefix.empty()) {
-            name = std::to_string(++number) + ".svg";
+        ++number;
+        const bool costs = std::any_of(report.subjects.begin(), report.subjects.end(),
+                                       [](const Summary& s) { return s.nanoseconds > 0; });
+        if (!plot_prefix.empty() && costs) {  // without costs there is nothing to draw
+            name = std::to_string(number) + ".svg";
             write_file(plot_prefix + name, plot_svg(report));
         }
         text += markdown_table(report, name.empty() ? "" : (link.empty() ? plot_prefix : link) + name);
