@@ -145,6 +145,12 @@ class Linker {
 
     void read(const StageInput& stage) {
         modules_.push_back(ir::read_module(stage.spirv, stage.file));
+        // OpenCL's and OpenGL's, which no Vulkan has and which change what is valid; the validator lets them by.
+        for (const uint32_t capability : {4, 5, 6, 7, 8, 13, 14, 15, 17, 19, 20, 21, 38, 58, 59, 60})
+            if (modules_.back().has_capability(static_cast<spv::Capability>(capability)))
+                ir::fail("target-capability", stage.file, 0,
+                         "stage '" + stage.name + "' declares SPIR-V capability " + std::to_string(capability) +
+                             ", which is not Vulkan's");
         // Before anything looks into it, and also when the result's validation is switched off: all that follows
         // relies on valid input.
         const std::string problem = options_.trust_input ? "" : link::validate_input(modules_.back());

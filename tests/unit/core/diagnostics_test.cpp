@@ -257,6 +257,10 @@ TEST(Diagnostics, TargetCapability) {
     std::vector<uint32_t> words = module_of(tracing_raygen());
     words.insert(words.begin() + 5, {2u << 16 | 17u, 21u});  // OpCapability AtomicStorage, which is OpenGL's
     expect_error(link({{StageKind::RayGen, words}}), "target-capability");
+    // With OpenCL's Kernel, signed integers would not be valid: the traversal's.
+    std::vector<uint32_t> kernel = module_of(stage("MissNV"));
+    kernel.insert(kernel.begin() + 5, {2u << 16 | 17u, 6u});
+    expect_error(link({{StageKind::RayGen, module_of(tracing_raygen())}, {StageKind::Miss, kernel}}), "target-capability");
 }
 
 // An input that is HitTriangleVertexPositionsKHR (5335), behind RayTracingPositionFetchKHR (5336).
