@@ -27,7 +27,6 @@ ContextOptions context_options(const std::string& device) {
     setenv("MESA_SHADER_CACHE_DISABLE", "true", 1);
     ContextOptions options;
     options.device = device;
-    options.print_device = false;
     options.all_core_features = true;
     return options;
 }

@@ -6,6 +6,7 @@
 import json
 import os
 import pty
+import re
 import struct
 import subprocess
 import sys
@@ -105,6 +106,39 @@ class Programs(unittest.TestCase):
         self.fails("nowhere.gltf", "--scene", "nowhere.gltf", *SMALL, "-o", self.path("a.png"))
         self.fails("there are: bunny cornell", "--scene", "builtin:foo", *SMALL, "-o", self.path("a.png"))
         self.fails("scenes are .gltf", "--scene", self.folder.name, *SMALL, "-o", self.path("a.png"))
+
+    def test_every_program_says_what_it_runs_on(self):
+        shaders = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../../testdata/shaders/run/hello.")
+        with open(self.path("case.json"), "w") as out:
+            json.dump({"name": "nothing/nothing", "stages": [{"stage": "rgen", "name": "rgen", "source": [
+                "#version 460", "#extension GL_NV_ray_tracing : require",
+                "layout(set = 0, binding = 1) buffer Out { uint r[]; };", "void main() { r[0] = 7u; }"]}],
+                       "size": [1, 1, 1], "bindings": {"0.1": {"size": 256, "fill": 0}},
+                       "expect": [{"cell": "runs", "at": 0, "values": [7], "type": "u32"}]}, out)
+        work = {
+            "rtc-render": [[*SMALL, "-o", self.path("a.png")]],
+            "rtc-run": [[*(shaders + stage for stage in ("rgen", "rchit", "rmiss")), "--size", "4x4",
+                         "-o", self.path("b.png")]],
+            "rtc-conformance": [["--cases", self.folder.name, "--on", "rtc-nv"]],
+            "rtc-stress": [["--steps", "1", "--seeds", "1", "--max-primitives", "100"]],
+            "rtc-bench": [["compile", "--shaders", "1", "--repeat", "1", "--driver"],
+                          ["build", "--sizes", "1000", "--modes", "fast", "--instances", "0", "--repeats", "1",
+                           "--native", "none"],
+                          ["trace", "--scenes", "cornell", "--workloads", "primary", "--width", "16", "--repeats", "1",
+                           "--native", "none"]],
+            "rtc-accuracy": [["leaks", "--tier", "fast", "--rays", "64", "--beyond", "0", "--seconds", "1"]],
+        }
+        for program in (RENDER, *OTHERS):
+            for arguments in work[os.path.basename(program)]:
+                with self.subTest(program=program, arguments=arguments[:1]):
+                    device = "0"
+                    for _ in range(2):  # by its number, then by the name that was printed
+                        code, said, problem = run(program, *arguments, "--device", device)
+                        self.assertEqual(code, 0, said + problem)
+                        # (rtc-accuracy says it above its table.)
+                        line = r"(?m)^(?:device:|### .* on) (\S+) .*Vulkan 1\."
+                        self.assertRegex(said + problem, line)
+                        device = re.search(line, said + problem).group(1)
 
     def test_mistakes_are_told_before_the_work(self):
         out = ["-o", self.path("a.png")]
