@@ -34,6 +34,27 @@ for kind in KINDS:
         expect(f"local {kind.name} in a callable survives a nested callable", 64 + 2 * n, kind.expected(12)),
     ], section="design 2 Live values", scene=ONE_TRIANGLE, recursion=2, words=64 + 3 * n + 16, callable_depth=2)
 
+# What a function gives back through its parameters, in modules of both forms: where live values lie in memory
+# (address mode), such an argument is a copy.
+case("live-values/out-parameters", {
+    "rgen": nv(P + "void cut(uint v, out uint low, out uvec3 high) { low = v & 15u; high = uvec3(v >> 4u); }\n" + f"""void main() {{
+    uint sum = 0u;
+    p = 0u;
+    for (uint i = 0u; i < 3u; ++i) {{
+        uint low;
+        uvec3 high;
+        cut(gl_LaunchIDNV.x + 0x125u + i, low, high);
+        traceNV(scene, 0, 0xff, 0, 0, 0, {RAY}, 0);
+        sum += low * 100u + high.y;
+    }}
+    r[0] = sum; r[1] = p;
+}}
+"""),
+    "rmiss": MISS,
+    "rchit": nv(IN + "void main() { p += 10u; }\n", scene=False)},
+     [expect("out parameters survive a trace", 0, [(5 + 6 + 7) * 100 + 3 * 18, 30])],
+     section="design 2 Live values", scene=ONE_TRIANGLE)
+
 # Private (module-scope) variables: one copy per shader call, initialisers run at every entry.
 case("live-values/private-globals", {
     "rgen": nv(P + "uint g = 5u;\nuint h[3] = uint[3](1u, 2u, 3u);\nvoid bump() { g += 1u; h[g % 3u] += g; }\n" + f"""void main() {{
