@@ -20,7 +20,14 @@ using tools::Error;
 using Json = nlohmann::ordered_json;
 
 const std::vector<std::string> kAll = {"fast",       "watertight", "exact",       "exact64",
-                                       "contracted", "native",     "embree-fast", "embree-robust"};
+                                       "contracted", "native",     "embree-fast", "embree-robust",
+                                       "box16", "box8", "float-inverse", "t64"};
+
+// Points beside the tiers, which no pipeline can be compiled for.
+bool is_knob(const std::string& name) {
+    const auto first = std::find(kAll.begin(), kAll.end(), "box16");
+    return std::find(first, kAll.end(), name) != kAll.end();
+}
 
 bool is_embree(const std::string& name) { return name == "embree-fast" || name == "embree-robust"; }
 
@@ -43,7 +50,7 @@ class Subject {
             by_cpu_ = true;
             return;
         }
-        context_ = campaign_context(name_, settings.device, settings.validate);
+        context_ = campaign_context(is_knob(name_) ? "watertight" : name_, settings.device, settings.validate);
         device_ = tools::describe_device(context_->properties, context_->driver);
         by_cpu_ = context_->properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
         if (name_ == "native") {
@@ -53,6 +60,8 @@ class Subject {
         }
         TracerOptions options;
         options.variant = parse_variant(name_);
+        if (DeviceTracer::needs_float64(options.variant) && !context_->features.shaderFloat64)
+            throw tools::MissingFeature(name_ + " needs shaderFloat64");
         options.while_while = settings.while_while;
         options.storage_fetch = settings.storage;
         options.shared_stack = settings.shared_stack;
@@ -190,7 +199,7 @@ void measure(Subject& subject, Report& report, const Settings& settings) {
         report.agreement = measure_agreement(subject.first_hits(), agreement, &total);
         report.agreement.push_back(total);
     }
-    if (settings.self_hits && subject.context())
+    if (settings.self_hits && subject.context() && !is_knob(report.subject))
         report.self_hits = measure_self_hits(*subject.context(), report.subject, settings.self_hits);
 }
 
@@ -209,7 +218,7 @@ int measure_command(int argc, char** argv) {
     settings.axes = {"mesh"};
     app.add_option("--tier", tiers,
                    "fast, watertight, exact, exact64, contracted (the negative control), native, embree-fast, "
-                   "embree-robust or all; times are compared with the first's")
+                   "embree-robust, the laboratory's box16, box8, float-inverse, t64, or all; times are compared with the first's")
         ->delimiter(',');
     app.add_option("--device", settings.device, "device index or part of its name");
     app.add_option("--axes", settings.axes, "mesh, offset, size, aspect, distance, transform, zeros, all or none")

@@ -195,9 +195,16 @@ void rtc_candidate(uint primitive, uint geometry_flags, uint opacity) {
     rtc_cand_opaque = opacity;
 }
 
+#ifdef RTC_LAB_T64
+float rtc_lab_t(uint slot); // the laboratory's t in double (tools/accuracy/lab/lab_t64.glsl)
+#endif
+
 // A triangle that the ray meets at t, in units of the scaled direction: whether it counts, and what follows.
 uint rtc_meet_triangle(uint slot, uint primitive, uint flags, float t, float b1, float b2, bool front) {
     uint result = RTC_STEP_RUNNING;
+#ifdef RTC_LAB_T64
+    t = rtc_lab_t(slot);
+#endif
     if (rtc_in_range(t, slot, primitive, flags)) {
         front = front != ((rtc_trav_word & RTC_LEVEL_FLIP) != 0u);
         uint opacity = rtc_opacity(flags);
@@ -291,6 +298,9 @@ uint rtc_test_aabb(uint slot) {
     return result;
 }
 
+#ifdef RTC_LAB_NODES
+uint rtc_test_node(); // the laboratory's nodes of smaller boxes (tools/accuracy/lab/lab_nodes.glsl)
+#else
 // Both children of the node under the cursor; the nearer becomes the cursor.
 // (mix with a boolean is a select.)
 uint rtc_test_node() {
@@ -325,6 +335,7 @@ uint rtc_test_node() {
     }
     return result;
 }
+#endif
 
 // Takes the slot under the cursor, a leaf's.
 uint rtc_next_slot() {

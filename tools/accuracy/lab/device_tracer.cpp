@@ -7,6 +7,7 @@
 #include "error.h"
 #include "resources.h"
 #include "rtc/abi.h"
+#include "scene_knobs.h"
 #include "spirv_edit.h"
 
 namespace rtc::lab {
@@ -24,17 +25,29 @@ constexpr uint32_t kExact[] = {
 constexpr uint32_t kExact64[] = {
 #include "lab_exact64.inc"
 };
+constexpr uint32_t kBox16[] = {
+#include "lab_box16.inc"
+};
+constexpr uint32_t kBox8[] = {
+#include "lab_box8.inc"
+};
+constexpr uint32_t kT64[] = {
+#include "lab_t64.inc"
+};
 constexpr uint32_t kProbe[] = {
 #include "lab_probe.inc"
 };
 
 std::vector<uint32_t> module_words(Variant variant) {
     std::vector<uint32_t> words;
-    if (variant == Variant::Watertight || variant == Variant::Contracted)
+    if (variant == Variant::Watertight || variant == Variant::Contracted || variant == Variant::FloatInverse)
         words.assign(std::begin(kWatertight), std::end(kWatertight));
     if (variant == Variant::Fast) words.assign(std::begin(kFast), std::end(kFast));
     if (variant == Variant::Exact) words.assign(std::begin(kExact), std::end(kExact));
     if (variant == Variant::Exact64) words.assign(std::begin(kExact64), std::end(kExact64));
+    if (variant == Variant::Box16) words.assign(std::begin(kBox16), std::end(kBox16));
+    if (variant == Variant::Box8) words.assign(std::begin(kBox8), std::end(kBox8));
+    if (variant == Variant::T64) words.assign(std::begin(kT64), std::end(kT64));
     if (variant == Variant::Probe) words.assign(std::begin(kProbe), std::end(kProbe));
     if (variant == Variant::Contracted) {
         contract(words);
@@ -51,10 +64,11 @@ constexpr uint32_t kResultWords = 16;
 }  // namespace
 
 Variant parse_variant(std::string_view name) {
-    for (Variant v : {Variant::Watertight, Variant::Fast, Variant::Exact, Variant::Exact64, Variant::Contracted})
+    for (Variant v : {Variant::Watertight, Variant::Fast, Variant::Exact, Variant::Exact64, Variant::Contracted, Variant::Box16,
+                      Variant::Box8, Variant::FloatInverse, Variant::T64})
         if (name == variant_name(v)) return v;
     throw tools::Error("unknown tier \"" + std::string(name) +
-                       "\": fast, watertight, exact, exact64 or contracted");
+                       "\": fast, watertight, exact, exact64, contracted, box16, box8, float-inverse or t64");
 }
 
 const char* variant_name(Variant variant) {
@@ -64,6 +78,10 @@ const char* variant_name(Variant variant) {
         case Variant::Exact: return "exact";
         case Variant::Exact64: return "exact64";
         case Variant::Contracted: return "contracted";
+        case Variant::Box16: return "box16";
+        case Variant::Box8: return "box8";
+        case Variant::FloatInverse: return "float-inverse";
+        case Variant::T64: return "t64";
         case Variant::Probe: return "probe";
     }
     return "";
@@ -195,8 +213,13 @@ DeviceTracer::~DeviceTracer() {
     for (VkDescriptorSetLayout layout : s.layouts) vkDestroyDescriptorSetLayout(device, layout, nullptr);
 }
 
-void DeviceTracer::set_scene(const HostScene& scene) {
+void DeviceTracer::set_scene(const HostScene& given) {
     State& s = *state_;
+    const Variant variant = s.options.variant;
+    HostScene changed;
+    if (variant == Variant::Box16 || variant == Variant::Box8) changed = with_small_boxes(given, variant == Variant::Box16 ? 16 : 8);
+    if (variant == Variant::FloatInverse) changed = with_float_inverse(given);
+    const HostScene& scene = changed.heap.empty() ? given : changed;
     vkDestroyBufferView(s.context.device, s.view, nullptr);
     s.view = VK_NULL_HANDLE;
     s.heap = tools::upload_vector(

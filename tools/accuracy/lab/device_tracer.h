@@ -11,8 +11,9 @@
 
 namespace rtc::lab {
 
-// Probe traces nothing: it asks for lanes and records (lab_probe.comp).
-enum class Variant { Watertight, Fast, Exact, Exact64, Contracted, Probe };
+// The tiers; the negative control; points beside the tiers, all `watertight` but for one thing (scene_knobs.h,
+// lab_nodes.glsl, lab_t64.glsl). Probe traces nothing: it asks for lanes and records (lab_probe.comp).
+enum class Variant { Watertight, Fast, Exact, Exact64, Contracted, Box16, Box8, FloatInverse, T64, Probe };
 Variant parse_variant(std::string_view name);  // throws tools::Error
 const char* variant_name(Variant variant);
 
@@ -32,9 +33,9 @@ class DeviceTracer final : public RayTracer {
     DeviceTracer(const tools::Context& context, const TracerOptions& options);
     ~DeviceTracer() override;
 
-    // Float64: for the negative control and exact64.
+    // Float64: for the negative control, exact64 and t64.
     static bool needs_float64(Variant variant) {
-        return variant == Variant::Contracted || variant == Variant::Exact64;
+        return variant == Variant::Contracted || variant == Variant::Exact64 || variant == Variant::T64;
     }
 
     void set_scene(const HostScene& scene) override;

@@ -6,6 +6,12 @@
 // Traversal alone: one lane traces one ray from a buffer and writes what it
 // found. The any-hit and intersection shaders are modes below.
 #include "traversal.glsl"
+#ifdef RTC_LAB_NODES
+#include "lab_nodes.glsl"
+#endif
+#ifdef RTC_LAB_T64
+#include "lab_t64.glsl"
+#endif
 
 struct LabRay {
     vec3 origin;
