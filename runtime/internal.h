@@ -159,9 +159,10 @@ struct RtrDevice_T {
     VkPipelineLayout kernel_layout;
     uint32_t level_nodes; /* levels of this many nodes are fitted in a dispatch each (build_phases.c) */
     bool validation;
-    /* With validation: the bottom levels that are bound and not destroyed. */
+    /* With validation: the structures that are bound and not destroyed (live.c). */
     atomic_flag live_lock;
     struct RtrAccelerationStructure_T* live;
+    uint32_t live_count;
     RtrGetBufferDeviceAddress get_buffer_device_address; /* NULL: no address mode */
     VkPipeline kernels[RTR_KERNEL_COUNT];
 };
@@ -389,6 +390,16 @@ void rtr_free_module(const VkAllocationCallbacks* allocator, RtrModule* module);
 /* Layout bindings of the reserved set that `used` names, at `base`; returns their number. */
 uint32_t rtr_reserved_bindings(uint32_t used, uint32_t base, VkDescriptorSetLayoutBinding* bindings);
 
+#define RTR_PARAM_BYTES (RTC_PARAM_QUADS * RTC_QUAD_BYTES)
+/* What the reserved bindings are to show, by RTC_BINDING_*. */
+typedef struct RtrReservedInfo {
+    VkDescriptorBufferInfo buffers[RTC_BINDING_COUNT];
+    VkBufferView texels;
+} RtrReservedInfo;
+void rtr_reserved_heap(RtrDevice device, RtrHeap heap, RtrReservedInfo* info);
+void rtr_write_reserved(RtrDevice device, const struct RtrPipeline_T* pipeline, VkDescriptorSet set,
+                        const RtrReservedInfo* info);
+
 /* What a binding of `as`'s header is. */
 static inline VkDescriptorBufferInfo rtr_header_info(const struct RtrAccelerationStructure_T* as) {
     VkDescriptorBufferInfo info;
@@ -406,17 +417,26 @@ void rtr_make_blob_version(const VkPhysicalDeviceIDProperties* id, uint8_t versi
 typedef struct RtrLaunchCheck {
     const RtrStridedBufferRegion* regions;  /* 4: raygen, miss, hit, callable */
     VkDescriptorBufferInfo params, control; /* slots of parameters; the control block */
-    VkDeviceSize table; /* RTR_CHECK_BYTES of the control buffer; not there without checked structures */
+    VkDeviceSize table; /* at least RTR_CHECK_BYTES of the control buffer; not there without checked structures */
     uint32_t slots, slot_words;
     uint32_t identity;
 } RtrLaunchCheck;
 /* Records the checks; afterwards a launch with an error has no lanes. */
 VkResult rtr_validate_launch(RtrRecorder recorder, const RtrLaunchCheck* check);
 
+/* ---- What is alive, with validation (live.c) --------------------------------------------------- */
+typedef struct RtrLive { /* as RTC_PARAM_LIVE_TABLE has it */
+    uint32_t lo, hi, quads, unused;
+} RtrLive;
+static inline uint64_t rtr_live_base(const RtrLive* e) { return (uint64_t)e->hi << 32 | e->lo; }
+void rtr_add_live(RtrAccelerationStructure as);
+void rtr_remove_live(RtrAccelerationStructure as);
+uint32_t rtr_count_live(RtrDevice device);
+/* Those in `heap` (NULL: in address mode), sorted by base; rtr_free with the recorder's allocator. */
+VkResult rtr_list_live(RtrRecorder recorder, RtrHeap heap, bool bottom_only, RtrLive** list, uint32_t* count);
+
 /* ---- References of instances, with validation (validate_instances.c) ------------------------ */
 #define RTR_CHECK_BYTES 16384u /* of the control region: a piece of the table of live bottom levels */
-void rtr_add_live(RtrAccelerationStructure bottom);
-void rtr_remove_live(RtrAccelerationStructure bottom);
 /* From now on launches of this recorder look at the structure. */
 VkResult rtr_add_checked(RtrRecorder recorder, RtrAccelerationStructure as, uint32_t index);
 /* Forgets those of the declared scene. */

@@ -35,9 +35,12 @@ static void describe_damage(const RtrLaunchError* e, char* text, size_t size) {
                                             {"instance", ", which the top level does not have"},
                                             {"node or instance", " more often than a tree can be met"}};
     const uint32_t kind = e->detail[1] >> RTC_BAD_SHIFT, instance = e->detail[1] & RTC_BAD_INSTANCE_MASK;
-    char met[80], where[32];
+    char met[128], where[32];
     if (kind == RTC_BAD_HEADER)
         snprintf(met, sizeof met, "a header that cannot be one");
+    else if (kind == RTC_BAD_BASE)
+        snprintf(met, sizeof met, "a reference (its low word 0x%08x) to no structure that is bound and not destroyed",
+                 e->detail[0]);
     else
         snprintf(met, sizeof met, "%s %u%s", kinds[kind < 7 ? kind : 0][0], e->detail[0], kinds[kind < 7 ? kind : 0][1]);
     if (instance == RTC_BAD_INSTANCE_MASK)

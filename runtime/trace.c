@@ -1,7 +1,7 @@
 /* Launches: parameters, control blocks, tiles and rounds. */
 #include "internal.h"
 
-#define PARAM_BYTES (RTC_PARAM_QUADS * RTC_QUAD_BYTES)
+
 #define UPDATE_BYTES 16384u /* per vkCmdUpdateBuffer; Vulkan allows 65536 */
 
 /* ---- Lanes, tiles, rounds -------------------------------------------------------------- */
@@ -79,19 +79,23 @@ uint32_t rtrGetLaunchTileCount(RtrDevice device, RtrPipeline p, uint32_t w, uint
 }
 
 static uint32_t param_stride(RtrDevice d) {
-    return (uint32_t)rtr_align(PARAM_BYTES, d->limits.minUniformBufferOffsetAlignment);
+    return (uint32_t)rtr_align(RTR_PARAM_BYTES, d->limits.minUniformBufferOffsetAlignment);
 }
 
 static VkDeviceSize control_bytes(uint32_t rounds) {
     return rtr_align(4ull * (RTC_CTRL_HEADER_WORDS + 4ull * (rounds + 1)), 256);
 }
 
+static VkDeviceSize live_bytes(uint32_t count) { return rtr_align((count + 1ull) * sizeof(RtrLive), 256); }
+
 VkDeviceSize rtrGetRecorderControlSize(RtrDevice d, uint32_t launches, uint32_t tiles, uint32_t rounds) {
-    VkDeviceSize params;
+    VkDeviceSize params, table = 0;
     if (!tiles) tiles = 1;
     if (!rounds) rounds = RTR_DEFAULT_ROUNDS;
     params = rtr_align((VkDeviceSize)param_stride(d) * tiles * rounds, 256);
-    return launches * (params + control_bytes(rounds) + (d->validation ? RTR_CHECK_BYTES : 0));
+    if (d->validation) table = live_bytes(rtr_count_live(d));
+    if (d->validation && table < RTR_CHECK_BYTES) table = RTR_CHECK_BYTES;
+    return launches * (params + control_bytes(rounds) + table);
 }
 
 /* ---- One launch --------------------------------------------------------------------------- */
@@ -107,7 +111,9 @@ typedef struct Launch {
     VkBuffer indirect; /* extents on the device; size is then the largest */
     VkDeviceSize indirect_offset;
     VkDeviceSize params, control; /* in the control buffer */
-    VkDeviceSize table;           /* behind the control block; no bytes without checked top levels */
+    VkDeviceSize table, table_bytes; /* behind the control block, see take_control */
+    RtrLive* live;                   /* what a checking module is told, or NULL */
+    uint32_t live_count;
     VkDescriptorSet reserved;
 } Launch;
 
@@ -158,7 +164,7 @@ static void fill_params(const Launch* l, uint32_t tile, uint32_t round, uint32_t
                             RTC_PARAM_CALLABLE_OFFSET};
     const uint64_t base = (uint64_t)tile * l->shape.tile_lanes;
     uint32_t i;
-    memset(w, 0, PARAM_BYTES);
+    memset(w, 0, RTR_PARAM_BYTES);
     for (i = 0; i < 4; i++) {
         const RtrStridedBufferRegion* g = &l->region[i];
         if (!g->buffer) continue;
@@ -176,6 +182,10 @@ static void fill_params(const Launch* l, uint32_t tile, uint32_t round, uint32_t
     w[RTC_PARAM_CONTROL_WORD] =
         l->p->reserved_in_app_set ? (uint32_t)((l->control - l->r->control_offset) / 4) : 0;
     w[RTC_PARAM_SCRATCH_WORD] = 0;
+    if (l->live) {
+        w[RTC_PARAM_LIVE_TABLE] = w[RTC_PARAM_CONTROL_WORD] + (uint32_t)((l->table - l->control) / 4);
+        w[RTC_PARAM_LIVE_COUNT] = l->live_count;
+    }
     w[RTC_PARAM_HEAP_QUADS] = l->r->heap ? (uint32_t)(l->r->heap->size / RTC_QUAD_BYTES) : 0;
     w[RTC_PARAM_FLAGS] = l->shape.tile_8x4 ? RTC_LAUNCH_TILE_8X4 : 0;
 }
@@ -237,41 +247,9 @@ static void before_transfer(RtrRecorder r) {
                 VK_ACCESS_SHADER_WRITE_BIT, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT);
 }
 
-typedef struct ReservedInfo {
-    VkDescriptorBufferInfo buffers[RTC_BINDING_COUNT];
-    VkBufferView texels;
-} ReservedInfo;
-
-static void write_reserved(RtrDevice d, const RtrPipeline p, VkDescriptorSet set, const ReservedInfo* info) {
-    VkWriteDescriptorSet writes[RTC_BINDING_COUNT];
-    VkDescriptorSetLayoutBinding bindings[RTC_BINDING_COUNT];
-    const uint32_t count =
-        rtr_reserved_bindings(p->header.used_bindings, p->header.reserved_binding, bindings);
-    uint32_t i;
-    memset(writes, 0, sizeof writes);
-    for (i = 0; i < count; i++) {
-        const uint32_t which = bindings[i].binding - p->header.reserved_binding;
-        writes[i].sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
-        writes[i].dstSet = set;
-        writes[i].dstBinding = bindings[i].binding;
-        writes[i].descriptorCount = 1;
-        writes[i].descriptorType = bindings[i].descriptorType;
-        writes[i].pBufferInfo = &info->buffers[which];
-        writes[i].pTexelBufferView = &info->texels;
-    }
-    d->vk.UpdateDescriptorSets(d->device, count, writes, 0, NULL);
-}
-
-static void heap_info(RtrDevice d, RtrHeap heap, ReservedInfo* info) {
-    info->texels = heap->view;
-    info->buffers[RTC_BINDING_HEAP].buffer = heap->buffer;
-    info->buffers[RTC_BINDING_HEAP].offset = heap->offset;
-    info->buffers[RTC_BINDING_HEAP].range = rtr_min_size(heap->size, d->limits.maxStorageBufferRange);
-}
-
 static VkResult own_set(Launch* l) {
     RtrRecorder r = l->r;
-    ReservedInfo info;
+    RtrReservedInfo info;
     uint32_t i;
     VkResult result = rtr_allocate_set(r, l->p->reserved_layout, &l->reserved);
     if (result != VK_SUCCESS) return result;
@@ -281,52 +259,18 @@ static VkResult own_set(Launch* l) {
         info.buffers[i].offset = l->control;
         info.buffers[i].range = control_bytes(l->shape.rounds);
     }
+    info.buffers[RTC_BINDING_CONTROL].range = l->table + l->table_bytes - l->control;
     info.buffers[RTC_BINDING_PARAMS].offset = r->control_offset;
-    info.buffers[RTC_BINDING_PARAMS].range = PARAM_BYTES;
+    info.buffers[RTC_BINDING_PARAMS].range = RTR_PARAM_BYTES;
     for (i = 0; i < 4; i++) info.buffers[RTC_BINDING_SBT_RAYGEN + i] = l->sbt[i];
-    if (r->heap) heap_info(r->device, r->heap, &info);
+    if (r->heap) rtr_reserved_heap(r->device, r->heap, &info);
     if (r->scratch) {
         info.buffers[RTC_BINDING_SCRATCH].buffer = r->scratch;
         info.buffers[RTC_BINDING_SCRATCH].offset = r->scratch_offset;
         info.buffers[RTC_BINDING_SCRATCH].range =
             rtr_min_size(r->scratch_size, r->device->limits.maxStorageBufferRange);
     }
-    write_reserved(r->device, l->p, l->reserved, &info);
-    return VK_SUCCESS;
-}
-
-VkResult rtrWriteReservedDescriptors(RtrDevice d, RtrPipeline p, VkDescriptorSet set,
-                                     const RtrReservedDescriptors* in) {
-    const VkBuffer sbt[4] = {in->raygenBuffer, in->missBuffer, in->hitBuffer, in->callableBuffer};
-    ReservedInfo info;
-    uint32_t i;
-    if (!p->reserved_in_app_set)
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "reserved-set",
-                         "the pipeline keeps its reserved bindings in a set of the runtime");
-    if (!in->recorder || !in->recorder->control)
-        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "control-buffer",
-                         "RtrReservedDescriptors: a recorder with a control region is needed");
-    info.texels = VK_NULL_HANDLE;
-    for (i = 0; i < RTC_BINDING_COUNT; i++) {
-        info.buffers[i].buffer = in->recorder->control;
-        info.buffers[i].offset = in->recorder->control_offset;
-        info.buffers[i].range = rtr_min_size(in->recorder->control_size, d->limits.maxStorageBufferRange);
-    }
-    info.buffers[RTC_BINDING_PARAMS].range = PARAM_BYTES;
-    for (i = 0; i < 4; i++) {
-        if (!sbt[i]) continue;
-        info.buffers[RTC_BINDING_SBT_RAYGEN + i].buffer = sbt[i];
-        info.buffers[RTC_BINDING_SBT_RAYGEN + i].offset = 0;
-        info.buffers[RTC_BINDING_SBT_RAYGEN + i].range = VK_WHOLE_SIZE;
-    }
-    if (in->heap) heap_info(d, in->heap, &info);
-    if (in->launchScratch) {
-        info.buffers[RTC_BINDING_SCRATCH].buffer = in->launchScratch;
-        info.buffers[RTC_BINDING_SCRATCH].offset = in->launchScratchOffset;
-        info.buffers[RTC_BINDING_SCRATCH].range =
-            rtr_min_size(in->launchScratchSize, d->limits.maxStorageBufferRange);
-    }
-    write_reserved(d, p, set, &info);
+    rtr_write_reserved(r->device, l->p, l->reserved, &info);
     return VK_SUCCESS;
 }
 
@@ -449,6 +393,20 @@ static VkResult prepare_indirect(const Launch* l) {
     return VK_SUCCESS;
 }
 
+/* The table that a module linked --checked looks bases up in; what was checked before used its place. */
+static void upload_live(const Launch* l) {
+    RtrRecorder r = l->r;
+    const uint32_t most = UPDATE_BYTES / sizeof(RtrLive);
+    uint32_t at;
+    before_transfer(r);
+    for (at = 0; at < l->live_count; at += most) {
+        const uint32_t n = l->live_count - at < most ? l->live_count - at : most;
+        r->device->vk.CmdUpdateBuffer(r->cmd, r->control, l->table + at * sizeof(RtrLive), n * sizeof(RtrLive),
+                                      l->live + at);
+    }
+    after_transfer(r);
+}
+
 static VkResult validate(const Launch* l) {
     RtrDevice d = l->r->device;
     RtrLaunchCheck c;
@@ -498,12 +456,15 @@ static VkResult record_tiles(Launch* l) {
     return VK_SUCCESS;
 }
 
+/* Parameters, control block, and with validation a table: pieces of it while instances are checked before the launch
+ * (RTR_CHECK_BYTES), then the whole for a module that checks. */
 static VkResult take_control(Launch* l) {
     RtrRecorder r = l->r;
     const VkDeviceSize params =
         rtr_align((VkDeviceSize)param_stride(r->device) * l->shape.tiles * l->shape.rounds, 256);
     const VkDeviceSize block = control_bytes(l->shape.rounds);
-    const VkDeviceSize table = r->checked_count ? RTR_CHECK_BYTES : 0;
+    VkDeviceSize table = r->checked_count ? RTR_CHECK_BYTES : 0;
+    if (l->live && live_bytes(l->live_count) > table) table = live_bytes(l->live_count);
     if (r->launch_count == r->launch_capacity) {
         const VkAllocationCallbacks* a = r->has_allocator ? &r->allocator : NULL;
         const uint32_t capacity = r->launch_capacity ? 2 * r->launch_capacity : 16;
@@ -517,14 +478,38 @@ static VkResult take_control(Launch* l) {
     if (params + block + table > r->control_size - r->control_used)
         return rtr_error(r->device, VK_ERROR_OUT_OF_POOL_MEMORY, "control-region",
                          "the recorder's control region of %llu bytes is full: this launch (%u tiles, %u "
-                         "rounds) needs %llu, "
+                         "rounds%s) needs %llu, "
                          "%llu are left (rtrGetRecorderControlSize, rtrRetireRecorder)",
                          (unsigned long long)r->control_size, l->shape.tiles, l->shape.rounds,
+                         l->live ? ", a table of all live structures" : "",
                          (unsigned long long)(params + block + table),
                          (unsigned long long)(r->control_size - r->control_used));
     l->params = r->control_offset + r->control_used;
     l->control = l->params + params;
     l->table = l->control + block;
+    l->table_bytes = table;
+    return VK_SUCCESS;
+}
+
+static VkResult record(Launch* l) {
+    RtrRecorder r = l->r;
+    VkResult result = take_control(l);
+    if (result != VK_SUCCESS) return result;
+    place_sbt(l);
+    if (!l->p->reserved_in_app_set && (result = own_set(l)) != VK_SUCCESS) return result;
+    /* With the control region bound whole, earlier launches count as writers of all of it. */
+    if (l->p->reserved_in_app_set) before_transfer(r);
+    upload_params(l);
+    reset_control(l, 0, true);
+    after_transfer(r);
+    if (l->indirect && (result = prepare_indirect(l)) != VK_SUCCESS) return result;
+    if (r->device->validation && (result = validate(l)) != VK_SUCCESS) return result;
+    if (l->live) upload_live(l);
+    if ((result = record_tiles(l)) != VK_SUCCESS) return result;
+    r->launches[r->launch_count].offset = l->control;
+    r->launches[r->launch_count].size = control_bytes(l->shape.rounds);
+    r->launch_count++;
+    r->control_used = l->table + l->table_bytes - r->control_offset;
     return VK_SUCCESS;
 }
 
@@ -579,22 +564,14 @@ static VkResult trace(RtrRecorder r, const RtrStridedBufferRegion* raygen, const
     l.size[1] = h;
     l.size[2] = d;
     if ((result = shape_launch(r, w, h, d, &l.shape)) != VK_SUCCESS) return result;
-    if ((result = take_control(&l)) != VK_SUCCESS) return result;
-    place_sbt(&l);
-    if (!l.p->reserved_in_app_set && (result = own_set(&l)) != VK_SUCCESS) return result;
-    /* With the control region bound whole, earlier launches count as writers of all of it. */
-    if (l.p->reserved_in_app_set) before_transfer(r);
-    upload_params(&l);
-    reset_control(&l, 0, true);
-    after_transfer(r);
-    if (indirect && (result = prepare_indirect(&l)) != VK_SUCCESS) return result;
-    if (r->device->validation && (result = validate(&l)) != VK_SUCCESS) return result;
-    if ((result = record_tiles(&l)) != VK_SUCCESS) return result;
-    r->launches[r->launch_count].offset = l.control;
-    r->launches[r->launch_count].size = control_bytes(l.shape.rounds);
-    r->launch_count++;
-    r->control_used = l.table + (r->checked_count ? RTR_CHECK_BYTES : 0) - r->control_offset;
-    return VK_SUCCESS;
+    if (r->device->validation && l.p->header.flags & RTC_MODULE_CHECKED) {
+        const bool addresses = l.p->header.flags & RTC_MODULE_ADDRESS_MODE;
+        result = rtr_list_live(r, addresses ? NULL : r->heap, false, &l.live, &l.live_count);
+        if (result != VK_SUCCESS) return result;
+    }
+    result = record(&l);
+    rtr_free(r->has_allocator ? &r->allocator : NULL, l.live);
+    return result;
 }
 
 VkResult rtrCmdTraceRaysRegions(RtrRecorder r, const RtrStridedBufferRegion* raygen,

@@ -1,79 +1,6 @@
 /* RtrDeviceCreateInfo::validation: references of instances must be those of bottom levels that
- * are bound and not destroyed. The host knows which those are; the device compares. */
-#include <stdlib.h>
-
+ * are bound and not destroyed. The host knows which those are (live.c); the device compares. */
 #include "build.h"
-
-/* ---- What is alive -------------------------------------------------------------------------- */
-
-static void lock(RtrDevice d) {
-    while (atomic_flag_test_and_set_explicit(&d->live_lock, memory_order_acquire)) {
-    }
-}
-static void unlock(RtrDevice d) { atomic_flag_clear_explicit(&d->live_lock, memory_order_release); }
-
-void rtr_add_live(RtrAccelerationStructure as) {
-    RtrDevice d = as->device;
-    if (!d->validation || as->type != VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_NV) return;
-    lock(d);
-    as->live_next = d->live;
-    if (d->live) d->live->live_before = as;
-    d->live = as;
-    unlock(d);
-}
-
-void rtr_remove_live(RtrAccelerationStructure as) {
-    RtrDevice d = as->device;
-    if (!d->validation || !as->buffer || as->type != VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_NV) return;
-    lock(d);
-    if (as->live_next) as->live_next->live_before = as->live_before;
-    if (as->live_before)
-        as->live_before->live_next = as->live_next;
-    else
-        d->live = as->live_next;
-    unlock(d);
-}
-
-typedef struct Entry {
-    uint32_t lo, hi, quads, unused;
-} Entry;
-
-static uint64_t reference(const Entry* e) { return (uint64_t)e->hi << 32 | e->lo; }
-
-static int by_reference(const void* a, const void* b) {
-    const uint64_t x = reference(a), y = reference(b);
-    return x < y ? -1 : x > y;
-}
-
-/* The bottom levels that a top level in `heap` (NULL: address mode) can refer to, sorted. */
-static VkResult make_table(RtrRecorder r, RtrHeap heap, Entry** table, uint32_t* count) {
-    RtrDevice d = r->device;
-    const VkAllocationCallbacks* a = r->has_allocator ? &r->allocator : NULL;
-    uint32_t room = 0, n = 0;
-    RtrAccelerationStructure as;
-    for (;;) {
-        *table = rtr_alloc(a, room * sizeof **table);
-        if (!*table) return VK_ERROR_OUT_OF_HOST_MEMORY;
-        lock(d);
-        for (n = 0, as = d->live; as; as = as->live_next) {
-            if (as->heap != heap) continue;
-            if (n < room) {
-                const VkDeviceSize quads = as->size / RTC_QUAD_BYTES;
-                (*table)[n].lo = (uint32_t)as->base;
-                (*table)[n].hi = (uint32_t)(as->base >> 32);
-                (*table)[n].quads = quads > 0xffffffffu ? 0xffffffffu : (uint32_t)quads;
-            }
-            n++;
-        }
-        unlock(d);
-        if (n <= room) break;
-        rtr_free(a, *table);
-        room = n;
-    }
-    *count = n;
-    qsort(*table, n, sizeof **table, by_reference);
-    return VK_SUCCESS;
-}
 
 /* ---- Pieces of the table, and what is looked at with each ------------------------------------- */
 
@@ -92,18 +19,18 @@ typedef struct Check {
 static VkResult look_through(Check* c) {
     RtrRecorder r = c->r;
     const RtrDeviceTable* vk = &r->device->vk;
-    const uint32_t room = (uint32_t)(c->table.range / sizeof(Entry));
-    Entry* entries;
+    const uint32_t room = (uint32_t)(c->table.range / sizeof(RtrLive));
+    RtrLive* entries;
     uint32_t count, at = 0;
-    VkResult result = make_table(r, c->heap, &entries, &count);
+    VkResult result = rtr_list_live(r, c->heap, true, &entries, &count);
     if (result != VK_SUCCESS) return result;
     do {
         const uint32_t n = count - at < room ? count - at : room;
-        const uint64_t first = at ? reference(&entries[at]) : 0;
-        const uint64_t last = at + n < count ? reference(&entries[at + n]) - 1 : ~0ull;
+        const uint64_t first = at ? rtr_live_base(&entries[at]) : 0;
+        const uint64_t last = at + n < count ? rtr_live_base(&entries[at + n]) - 1 : ~0ull;
         rtr_barrier(r, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_WRITE_BIT,
                     VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT);
-        if (n) vk->CmdUpdateBuffer(r->cmd, c->table.buffer, c->table.offset, n * sizeof(Entry), &entries[at]);
+        if (n) vk->CmdUpdateBuffer(r->cmd, c->table.buffer, c->table.offset, n * sizeof(RtrLive), &entries[at]);
         rtr_barrier(r, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT,
                     VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT);
         c->push.total = n;

@@ -205,6 +205,8 @@
 #define RTC_PARAM_SCRATCH_WORD 30u /* word in the scratch buffer where lane storage starts */
 #define RTC_PARAM_HEAP_QUADS 31u /* size of the AS heap in quads, for checking traversal */
 #define RTC_PARAM_FLAGS 32u /* RTC_LAUNCH_* */
+#define RTC_PARAM_LIVE_TABLE 33u /* checking traversal: word in the control buffer where the table of live structures starts; 0: none */
+#define RTC_PARAM_LIVE_COUNT 34u /* its entries: base low, high, quads of the object, 0; sorted by base */
 #define RTC_LAUNCH_TILE_8X4 1u /* lanes walk 8x4 pixel tiles; otherwise rows */
 
 /* Lanes: lane = LANE_BASE + gl_WorkGroupID (x + 65535 y, linearised) * workgroup
@@ -248,6 +250,7 @@
 #define RTC_BAD_SLOT 4u /* a slot that it does not have */
 #define RTC_BAD_INSTANCE_INDEX 5u /* an instance that the top level does not have */
 #define RTC_BAD_CYCLE 6u /* a node or instance that was visited before: nodes form no tree */
+#define RTC_BAD_BASE 7u /* a base (its low word) where no structure is that is bound and not destroyed */
 /* DETAIL2 of errors found in the table before the launch: this bit, the region (0 raygen, 1
  * miss, 2 hit, 3 callable), the record. */
 #define RTC_ERROR_RECORD 0x80000000u

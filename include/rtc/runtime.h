@@ -164,7 +164,8 @@ typedef struct RtrDeviceCreateInfo {
      * told of likewise (BAD_UPDATE). Scratch of top levels then needs
      * TRANSFER_DST, and launches more of the control region (rtrGetRecorderControlSize).
      * Damage inside of structures is the module's to find: rtc --checked links a traversal that
-     * follows nothing it has not checked (launch error BAD_MEMORY). */
+     * follows nothing it has not checked (launch error BAD_MEMORY); it is told with each launch
+     * which structures are bound and not destroyed, and reads no other memory. */
     VkBool32 validation;
     /* What `device` was created with, read during this call: a pipeline whose module needs a
      * feature or extension that is not in it is then refused by name. NULL: only what the
@@ -396,7 +397,8 @@ typedef struct RtrRecorderCreateInfo {
 
 /* Bytes of control region for `launchCount` launches between two resets, each of at
  * most `tileCount` tiles (1 unless you set a tile size or little launch scratch) and
- * `roundCount` rounds (1 for modules that are not resumable). An upper bound. */
+ * `roundCount` rounds (1 for modules that are not resumable). An upper bound. With validation
+ * it also holds a table of the acceleration structures that are bound at the time of this call. */
 RTR_API VkDeviceSize rtrGetRecorderControlSize(RtrDevice device, uint32_t launchCount, uint32_t tileCount,
                                                uint32_t roundCount);
 

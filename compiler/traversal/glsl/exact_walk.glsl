@@ -6,6 +6,7 @@
 #define RTC_TIER_DEFERS
 
 uint rtc_test_triangle(uint slot) {
+    RTC_CHECK(slot = rtc_checked_slot(slot);)
     RtcBase at = rtc_advance(rtc_trav_base, rtc_trav_slots + slot * RTC_TRIANGLE_QUADS);
     uvec4 q0 = rtc_quad(at, 0u);
     uvec4 q1 = rtc_quad(at, 1u);

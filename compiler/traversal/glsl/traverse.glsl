@@ -83,7 +83,9 @@ void rtc_trace_begin() {
     // An infinite tmax is legal; as bits it is below every NaN.
     bool ordered =
         (floatBitsToUint(rtc_ray_tmax) & 0x7fffffffu) <= 0x7f800000u && rtc_ray_tmin <= rtc_ray_tmax;
-    if (!rtc_is_null(rtc_ray_root) && finite && ordered && rtc_largest(d) > 0.0) {
+    bool there = !rtc_is_null(rtc_ray_root);
+    RTC_CHECK(there = there && rtc_check_base(rtc_ray_root) != 0u;)
+    if (there && finite && ordered && rtc_largest(d) > 0.0) {
         uvec4 header = rtc_quad(rtc_ray_root, 0u); // self low, self high, magic, kind
         if (header.z != RTC_AS_MAGIC || header.w != RTC_AS_KIND_TOP) {
             rtc_error(RTC_LAUNCH_ERROR_ABI, header.z, header.w);

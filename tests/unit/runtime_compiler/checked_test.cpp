@@ -56,10 +56,12 @@ class CheckedTest : public StagesTest, public ::testing::WithParamInterface<bool
         make_table();
         sound.assign(scene->heap_buffer.as<uint32_t>(), scene->heap_buffer.as<uint32_t>() + scene->heap_buffer.size / 4);
     }
-    void make_pipeline(bool checked) {
+    void make_pipeline(bool checked, rtcc_accuracy accuracy = RTCC_ACCURACY_WATERTIGHT) {
         rtrDestroyPipeline(rtr, pipeline, nullptr);
+        pipeline = nullptr;
         auto options = rtcc_options_create();
         rtcc_options_set_checked(options, checked);
+        rtcc_options_set_accuracy(options, accuracy);
         rtcc_options_set_addressing(options, GetParam() ? RTCC_ADDRESSING_ADDRESS : RTCC_ADDRESSING_HEAP);
         const VkResult r = create(options);
         rtcc_options_release(options);
@@ -92,14 +94,16 @@ class CheckedTest : public StagesTest, public ::testing::WithParamInterface<bool
     }
     void restore() { memcpy(scene->heap_buffer.data, sound.data(), 4 * sound.size()); }
 
-    // The error of a launch that declares its scene.
-    RtrLaunchError launch_rays() {
+    // The error of a launch, whose scene is declared or not: then nothing looks at it before.
+    RtrLaunchError launch_rays(bool declare = true) {
         RtrLaunchError error{};
         vk->begin();
         auto rec = scene->recorder;
         EXPECT_EQ(rtrBeginRecorder(rec, vk->cmd), VK_SUCCESS);
         const RtrAccelerationStructure declared[2] = {top, bottom};
-        EXPECT_EQ(rtrCmdDeclareScene(rec, 2, declared), VK_SUCCESS);
+        if (declare) {
+            EXPECT_EQ(rtrCmdDeclareScene(rec, 2, declared), VK_SUCCESS);
+        }
         rtrCmdBindPipeline(rec, pipeline);
         rtrCmdBindDescriptorSets(rec, 0, 1, &set, 0, nullptr);
         if (scene->heap) rtrCmdSetHeap(rec, scene->heap);
@@ -184,6 +188,192 @@ TEST_P(CheckedTest, SoundScenesLookTheSame) {
     EXPECT_EQ(memcmp(result.data, hits.data(), 4 * kRays), 0);
 }
 
+// What the next test is about; the launch declares no scene, so that nothing but the traversal looks.
+struct Reference {
+    uint32_t kind, instance;
+    std::string says;
+};
+
+void expect_reported(const RtrLaunchError& error, const Reference& expected) {
+    char text[256];
+    rtrFormatLaunchError(&error, text, sizeof text);
+    EXPECT_EQ(error.code, RTC_LAUNCH_ERROR_BAD_MEMORY);
+    EXPECT_GT(error.count, 0u);
+    EXPECT_EQ(error.detail[1] >> RTC_BAD_SHIFT, expected.kind) << text;
+    EXPECT_EQ(error.detail[1] & RTC_BAD_INSTANCE_MASK, expected.instance) << text;
+    EXPECT_NE(std::string(text).find(expected.says), std::string::npos) << text;
+}
+
+TEST_P(CheckedTest, ReferencesToNothingAreNamedNotFollowed) {
+    constexpr uint32_t in_top = RTC_BAD_INSTANCE_MASK;
+    ASSERT_EQ(launch_rays(false).code, RTC_LAUNCH_ERROR_NONE);
+    // All instances but 2 keep out of the way.
+    auto record = [&](uint32_t i) { return words(top) + 4 * words(top)[RTC_HDR_SLOTS] + 32 * i; };
+    for (uint32_t i = 0; i < 5; i++)
+        if (i != 2) record(i)[24] = record(i)[25] = 0;
+    ASSERT_EQ(launch_rays(false).code, RTC_LAUNCH_ERROR_NONE);
+    auto refer = [&](uint64_t base) {
+        record(2)[24] = uint32_t(base);
+        record(2)[25] = uint32_t(base >> 32);
+    };
+    const uint64_t at = scene->handle(bottom), page = GetParam() ? 4096 : 4096 / RTC_QUAD_BYTES;
+    const uint64_t anywhere[] = {at + (GetParam() ? 256 : 16), at + (GetParam() ? 16 : 1), at - 1, at + 64 * page,
+                                 0x18, 0xffffffff, 0x0000123456789a00, 0xfffffffffffff000, ~0ull, scene->handle(top)};
+    for (const uint64_t base : anywhere) {
+        if (!GetParam() && base >> 32) continue;  // the high word is not looked at
+        SCOPED_TRACE(base);
+        refer(base);
+        if (base == scene->handle(top))
+            expect_reported(launch_rays(false), {RTC_BAD_HEADER, 2, "instance 2 a ray met a header that cannot be one"});
+        else
+            expect_reported(launch_rays(false), {RTC_BAD_BASE, 2, "to no structure that is bound and not destroyed"});
+    }
+    refer(at);
+    ASSERT_EQ(launch_rays(false).code, RTC_LAUNCH_ERROR_NONE);
+    // The top level says of itself that it were elsewhere; that is what shaders trace into.
+    uint32_t* self = words(top);
+    const uint32_t kept[2] = {self[RTC_HDR_SELF_LO], self[RTC_HDR_SELF_HI]};
+    for (const uint64_t base : {uint64_t(at - 1), uint64_t(0x0000123456789a00), ~uint64_t(0)}) {
+        SCOPED_TRACE(base);
+        self[RTC_HDR_SELF_LO] = uint32_t(base);
+        self[RTC_HDR_SELF_HI] = GetParam() ? uint32_t(base >> 32) : 0u;
+        expect_reported(launch_rays(false), {RTC_BAD_BASE, in_top, "in the top level"});
+    }
+    self[RTC_HDR_SELF_LO] = kept[0];
+    self[RTC_HDR_SELF_HI] = kept[1];
+    // A header that is no header of this object: more slots than it has room for, and slots behind it.
+    for (const auto& [word, value] : {std::pair{RTC_HDR_SLOT_COUNT, 0x0fffffffu}, std::pair{RTC_HDR_SLOT_COUNT, 400u},
+                                     std::pair{RTC_HDR_SLOTS, 0x7fffff00u}, std::pair{RTC_HDR_NODE_COUNT, 100000u}}) {
+        SCOPED_TRACE(word);
+        const uint32_t before = words(bottom)[word];
+        words(bottom)[word] = value;
+        expect_reported(launch_rays(false), {RTC_BAD_HEADER, 2, "header that cannot be one"});
+        words(bottom)[word] = before;
+    }
+    ASSERT_EQ(launch_rays(false).code, RTC_LAUNCH_ERROR_NONE);
+}
+
+// A structure that is destroyed is met by nobody, whatever lies in its memory by then.
+TEST_P(CheckedTest, DestroyedStructuresAreNamed) {
+    VkGeometryNV geometry = scene->triangles({{0, 0, 0}, {200, 0, 0}, {0, 200, 0}});
+    VkAccelerationStructureCreateInfoNV create_info{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_CREATE_INFO_NV};
+    VkAccelerationStructureInfoNV& info = create_info.info;
+    info.sType = VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV;
+    info.type = VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_NV;
+    info.geometryCount = 1;
+    info.pGeometries = &geometry;
+    RtrAccelerationStructure mortal = nullptr;
+    ASSERT_EQ(rtrCreateAccelerationStructure(rtr, &create_info, nullptr, &mortal), VK_SUCCESS);
+    RtrBindAccelerationStructureMemoryInfo bind{};
+    bind.accelerationStructure = mortal;
+    const VkDeviceSize place = 1 << 16;  // free in this scene
+    if (GetParam())
+        bind.buffer = scene->heap_buffer.handle, bind.bufferOffset = place;
+    else
+        bind.heap = scene->heap, bind.heapOffset = place;
+    ASSERT_EQ(rtrBindAccelerationStructureMemory(rtr, 1, &bind), VK_SUCCESS);
+    scene->run([&] {
+        EXPECT_EQ(rtrCmdBuildAccelerationStructure(scene->recorder, &info, VK_NULL_HANDLE, 0, VK_FALSE, mortal, nullptr,
+                                                   scene->scratch.handle, 0),
+                  VK_SUCCESS);
+    });
+    top = scene->build_top({scene->instance(mortal)});
+    ASSERT_EQ(rtrUpdateAccelerationStructureDescriptors(rtr, set, 0, 0, 1, &top, nullptr), VK_SUCCESS);
+    ASSERT_EQ(launch_rays(false).code, RTC_LAUNCH_ERROR_NONE);
+    ASSERT_EQ(result.as<uint32_t>()[0], 1050u);
+    const Reference dead{RTC_BAD_BASE, 0, "to no structure that is bound and not destroyed"};
+    rtrDestroyAccelerationStructure(rtr, mortal, nullptr);
+    expect_reported(launch_rays(false), dead);  // all is still there
+    memset(scene->heap_buffer.as<char>(place), 0x7f, 4096);
+    expect_reported(launch_rays(false), dead);
+    // Its place is another's by now: one that is not built, then one that is.
+    ASSERT_EQ(rtrCreateAccelerationStructure(rtr, &create_info, nullptr, &mortal), VK_SUCCESS);
+    bind.accelerationStructure = mortal;
+    ASSERT_EQ(rtrBindAccelerationStructureMemory(rtr, 1, &bind), VK_SUCCESS);
+    expect_reported(launch_rays(false), {RTC_BAD_HEADER, 0, "header that cannot be one"});
+    scene->run([&] {
+        EXPECT_EQ(rtrCmdBuildAccelerationStructure(scene->recorder, &info, VK_NULL_HANDLE, 0, VK_FALSE, mortal, nullptr,
+                                                   scene->scratch.handle, 0),
+                  VK_SUCCESS);
+    });
+    EXPECT_EQ(launch_rays(false).code, RTC_LAUNCH_ERROR_NONE);
+    rtrDestroyAccelerationStructure(rtr, mortal, nullptr);
+}
+
+// All tiers look before they read.
+TEST_P(CheckedTest, EveryTierChecksSlots) {
+    const uint32_t nodes = 4 * RTC_AS_HEADER_QUADS;
+    for (const auto accuracy : {RTCC_ACCURACY_FAST, RTCC_ACCURACY_WATERTIGHT, RTCC_ACCURACY_EXACT}) {
+        SCOPED_TRACE(accuracy);
+        make_pipeline(true, accuracy);
+        make_table();
+        ASSERT_EQ(launch_rays(false).code, RTC_LAUNCH_ERROR_NONE);
+        words(bottom)[nodes + 3] = RTC_REF_LEAF | 1u << RTC_REF_COUNT_SHIFT | 0x0ffffff0u;
+        float* box = reinterpret_cast<float*>(words(bottom)) + nodes;
+        for (int k = 0; k < 3; k++) box[k] = -1e4f, box[4 + k] = 1e4f;
+        const RtrLaunchError error = launch_rays(false);
+        EXPECT_EQ(error.code, RTC_LAUNCH_ERROR_BAD_MEMORY);
+        EXPECT_EQ(error.detail[1] >> RTC_BAD_SHIFT, RTC_BAD_SLOT);
+        restore();
+    }
+}
+
+// The table of what is alive needs room: more structures than rtrGetRecorderControlSize knew of are refused.
+TEST_P(CheckedTest, AFullControlRegionIsNamed) {
+    const VkDeviceSize before = rtrGetRecorderControlSize(rtr, 1, 1, 16);
+    VkAccelerationStructureCreateInfoNV info{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_CREATE_INFO_NV};
+    info.info.sType = VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV;
+    info.info.type = VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_NV;
+    std::vector<RtrAccelerationStructure> many(3000);
+    for (auto& as : many) {
+        ASSERT_EQ(rtrCreateAccelerationStructure(rtr, &info, nullptr, &as), VK_SUCCESS);
+        RtrBindAccelerationStructureMemoryInfo bind{};
+        bind.accelerationStructure = as;
+        if (GetParam())
+            bind.buffer = scene->heap_buffer.handle, bind.bufferOffset = 1 << 16;
+        else
+            bind.heap = scene->heap, bind.heapOffset = 1 << 16;
+        ASSERT_EQ(rtrBindAccelerationStructureMemory(rtr, 1, &bind), VK_SUCCESS);
+    }
+    const VkDeviceSize after = rtrGetRecorderControlSize(rtr, 1, 1, 16);
+    EXPECT_GE(after, 3000u * 16u);
+    EXPECT_GT(after, before);
+    for (const VkDeviceSize size : {before, after}) {
+        SCOPED_TRACE(size);
+        Buffer control = vk->buffer(size, RTR_CONTROL_BUFFER_USAGE);
+        RtrRecorderCreateInfo recorder_info{};
+        recorder_info.controlBuffer = control.handle;
+        recorder_info.controlSize = size;
+        RtrRecorder small = nullptr;
+        ASSERT_EQ(rtrCreateRecorder(rtr, &recorder_info, nullptr, &small), VK_SUCCESS);
+        std::swap(scene->recorder, small);
+        std::swap(scene->control, control);
+        if (size == after) {
+            EXPECT_EQ(launch_rays(false).code, RTC_LAUNCH_ERROR_NONE);
+        } else {
+            vk->begin();
+            EXPECT_EQ(rtrBeginRecorder(scene->recorder, vk->cmd), VK_SUCCESS);
+            rtrCmdBindPipeline(scene->recorder, pipeline);
+            rtrCmdBindDescriptorSets(scene->recorder, 0, 1, &set, 0, nullptr);
+            if (scene->heap) rtrCmdSetHeap(scene->recorder, scene->heap);
+            if (scratch_size) rtrCmdSetLaunchScratch(scene->recorder, scratch.handle, 0, scratch_size);
+            rtrCmdSetLaunchLimits(scene->recorder, 0, 16);
+            EXPECT_EQ(rtrCmdTraceRays(scene->recorder, sbt.handle, table.raygen.offset, sbt.handle, table.miss.offset,
+                                      table.miss.stride, sbt.handle, table.hit.offset, table.hit.stride,
+                                      VK_NULL_HANDLE, 0, 0, kRays, 1, 1),
+                      VK_ERROR_OUT_OF_POOL_MEMORY);
+            vk->submit();
+            EXPECT_EQ(rtrRetireRecorder(scene->recorder), VK_SUCCESS);
+        }
+        std::swap(scene->recorder, small);
+        std::swap(scene->control, control);
+        rtrDestroyRecorder(rtr, small, nullptr);
+        vk->destroy(control);
+    }
+    for (auto as : many) rtrDestroyAccelerationStructure(rtr, as, nullptr);
+    ASSERT_EQ(launch_rays().code, RTC_LAUNCH_ERROR_NONE);
+}
+
 // Words anywhere in the structures become anything; references become those of elsewhere. RTC_TEST_DAMAGES: how
 // often.
 TEST_P(CheckedTest, RandomDamageEndsInAnErrorOrAMiss) {
@@ -206,7 +396,7 @@ TEST_P(CheckedTest, RandomDamageEndsInAnErrorOrAMiss) {
                     memmove(w + rng() % (count - 64), w + rng() % (count - 64), 4 * (1 + rng() % 63));
             }
         }
-        const RtrLaunchError error = launch_rays();
+        const RtrLaunchError error = launch_rays(i % 2 == 0);  // looked at before the launch, or by the traversal alone
         ASSERT_FALSE(HasFailure()) << "damage " << i;
         error.code == RTC_LAUNCH_ERROR_NONE ? silent++ : found++;
         for (uint32_t r = 0; r < kRays; r++) {
