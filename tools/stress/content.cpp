@@ -288,9 +288,26 @@ Content make_content(Random& random, uint64_t most, bool large) {
     return content;
 }
 
+namespace {
+
+// How far vertices may move. Millions of triangles that each grow as large as their whole mesh would be a pile in which
+// one ray meets a hundred thousand: minutes of a GPU.
+double reach_of_a_move(const Geometry& g) {
+    if (g.primitives() <= 300) return 0.2;
+    float low = INFINITY, high = -INFINITY;
+    for (const auto& t : g.triangles) {
+        if (std::isnan(t[0].x)) continue;
+        low = std::min({low, t[0].x, t[1].x, t[2].x});
+        high = std::max({high, t[0].x, t[1].x, t[2].x});
+    }
+    return g.boxes || low > high ? 0.2 : std::min(0.2, double(high - low) / std::cbrt(double(g.primitives())));
+}
+
+}  // namespace
+
 void move_content(Content& content, Random& random) {
     for (Geometry& g : content.geometries) {
-        const double by = between(random, 0, 0.2);
+        const double by = between(random, 0, reach_of_a_move(g));
         if (g.boxes) {
             for (size_t i = 0; i < g.box_list.size(); ++i) {
                 if (std::isnan(g.box_list[i].min.x)) continue;

@@ -16,6 +16,7 @@ struct Options {
     uint64_t seed = 1, steps = 25, seeds = 1;
     stress::Limits limits;
     uint64_t heap_mb = 1024;
+    uint32_t step_budget = RTR_DEFAULT;
     std::string device, json, addressing = "heap";
     bool validate = false, quiet = false;
     double seconds = 0;
@@ -72,7 +73,7 @@ int run(const Options& options) {
     const bool addresses = options.addressing == "address";
     context_options.all_core_features = addresses;
     const tools::Context context(context_options);
-    stress::Device device(context, addresses);
+    stress::Device device(context, addresses, options.step_budget);
     const auto start = std::chrono::steady_clock::now();
     auto elapsed = [&] {
         return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -85,6 +86,7 @@ int run(const Options& options) {
         for (uint64_t i = 0; i < options.steps && !time_is_up; ++i) {
             try {
                 world.step();
+                if (!options.quiet) std::printf("%s\n", world.describe_step().c_str());
             } catch (const std::exception& e) {
                 throw tools::Error("seed " + std::to_string(seed) + ", " + e.what());
             }
@@ -144,6 +146,8 @@ int main(int argc, char** argv) {
     app.add_option("--seconds", options.seconds, "stop after this time");
     app.add_option("--addressing", options.addressing, "how structures are reached")
         ->check(CLI::IsMember({"heap", "address"}));
+    app.add_option("--step-budget", options.step_budget,
+                   "loop turns before a lane suspends, 0: never; otherwise as the device recommends, or 131072");
     app.add_option("--device", options.device, "a part of the device's name, or its number");
     app.add_option("--json", options.json, "write the counts there too");
     app.add_flag("--validate", options.validate, "under the validation layers, synchronisation included");

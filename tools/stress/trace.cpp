@@ -1,5 +1,6 @@
 // Rays through the world, and what the reference says of each result.
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -182,7 +183,9 @@ void World::trace() {
         }
     }
     const std::vector<Ray> rays = make_rays(instances);
+    const auto before = std::chrono::steady_clock::now();
     const std::vector<Hit> hits = tracer_.trace(heap_, top_->structure.handle, records, boxes, rays);
+    const auto traced = std::chrono::steady_clock::now();
 
     uint64_t all = 0;
     for (const InstanceReference& i : instances) all += i.bottom ? i.bottom->content().primitives() : 0;
@@ -194,6 +197,8 @@ void World::trace() {
         compare(rays[i], hits[i], reference, instances);
     }
     counts_.rays += rays.size();
+    trace_seconds_ = std::chrono::duration<double>(traced - before).count();
+    reference_seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - traced).count();
 }
 
 void World::compare(const Ray& ray, const Hit& hit, const RayReference& reference,

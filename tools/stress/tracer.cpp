@@ -56,7 +56,9 @@ std::vector<uint32_t> compile(bool addresses) {
     return words;
 }
 
-constexpr uint32_t kRounds = 1024;  // worlds may be piles
+// A ray may meet a hundred thousand instances that lie on each other: launches that run out of rounds begin anew with
+// more.
+constexpr uint32_t kRounds = 512, kMostRounds = 1u << 17;
 
 }  // namespace
 
@@ -97,9 +99,13 @@ void* VKAPI_CALL Device::reallocate(void* user, void* old, size_t size, size_t a
     return fresh;
 }
 
-Device::Device(const tools::Context& c, bool use_addresses) : context(c), addresses(use_addresses) {
+Device::Device(const tools::Context& c, bool use_addresses, uint32_t budget)
+    : context(c), addresses(use_addresses), step_budget(budget) {
     tools::check(rtrGetPhysicalDeviceSupport(c.instance, c.physical, vkGetInstanceProcAddr, &support),
                  "rtrGetPhysicalDeviceSupport");
+    if (step_budget == RTR_DEFAULT) {
+        step_budget = support.recommended.stepBudget ? support.recommended.stepBudget : kStepBudget;
+    }
     callbacks_ = {&live_, allocate, reallocate, release, nullptr, nullptr};
     VkDebugUtilsMessengerCreateInfoEXT messenger{VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT};
     messenger.messageSeverity =
@@ -153,7 +159,10 @@ Tracer::Tracer(Device& device) : device_(device) {
     tools::check(vkAllocateDescriptorSets(context.device, &allocation, &set_), "vkAllocateDescriptorSets");
 
     const std::vector<uint32_t> words = compile(device.addresses);
+    RtrTraceOptions options = RTR_TRACE_OPTIONS_DEFAULT;
+    options.stepBudget = device.step_budget;
     RtrRayTracingPipelineCreateInfo info{};
+    info.pOptions = &options;
     info.pCode = words.data();
     info.codeSize = words.size() * 4;
     info.setLayoutCount = 1;
@@ -163,13 +172,20 @@ Tracer::Tracer(Device& device) : device_(device) {
 
     const VkDeviceSize scratch = rtrGetLaunchScratchSize(device.handle, pipeline_, kMostRays, 1, 1, nullptr);
     if (scratch) scratch_ = Buffer(context, scratch, RTR_LAUNCH_SCRATCH_BUFFER_USAGE, MemoryKind::Device);
-    const uint32_t tiles = rtrGetLaunchTileCount(device.handle, pipeline_, kMostRays, 1, 1, scratch, 0);
-    const VkDeviceSize control = rtrGetRecorderControlSize(device.handle, 1, tiles, kRounds);
-    control_ = Buffer(context, control, RTR_CONTROL_BUFFER_USAGE, MemoryKind::Host);
-    RtrRecorderCreateInfo recorder{};
-    recorder.controlBuffer = control_.handle;
-    recorder.controlSize = control;
-    device.check(rtrCreateRecorder(device.handle, &recorder, nullptr, &recorder_), "rtrCreateRecorder");
+    make_recorder(kRounds);
+}
+
+void Tracer::make_recorder(uint32_t rounds) {
+    if (recorder_) rtrDestroyRecorder(device_.handle, recorder_, nullptr);
+    recorder_ = nullptr;
+    rounds_ = rounds;
+    const uint32_t tiles = rtrGetLaunchTileCount(device_.handle, pipeline_, kMostRays, 1, 1, scratch_.size, 0);
+    const VkDeviceSize control = rtrGetRecorderControlSize(device_.handle, 1, tiles, rounds);
+    control_ = Buffer(device_.context, control, RTR_CONTROL_BUFFER_USAGE, MemoryKind::Host);
+    RtrRecorderCreateInfo info{};
+    info.controlBuffer = control_.handle;
+    info.controlSize = control;
+    device_.check(rtrCreateRecorder(device_.handle, &info, nullptr, &recorder_), "rtrCreateRecorder");
 }
 
 Tracer::~Tracer() {
@@ -217,28 +233,36 @@ std::vector<Hit> Tracer::trace(RtrHeap heap, RtrAccelerationStructure top,
     write.pBufferInfo = infos;
     vkUpdateDescriptorSets(context.device, 1, &write, 0, nullptr);
 
-    context.run([&](VkCommandBuffer commands) {
-        device_.check(rtrBeginRecorder(recorder_, commands), "rtrBeginRecorder");
-        if (heap) device_.check(rtrCmdSetHeap(recorder_, heap), "rtrCmdSetHeap");
-        device_.check(rtrCmdSetLaunchLimits(recorder_, 0, kRounds), "rtrCmdSetLaunchLimits");
-        if (scratch_.handle)
-            device_.check(rtrCmdSetLaunchScratch(recorder_, scratch_.handle, 0, scratch_.size),
-                          "rtrCmdSetLaunchScratch");
-        device_.check(rtrCmdBindPipeline(recorder_, pipeline_), "rtrCmdBindPipeline");
-        device_.check(rtrCmdBindDescriptorSets(recorder_, 0, 1, &set_, 0, nullptr),
-                      "rtrCmdBindDescriptorSets");
-        device_.check(
-            rtrCmdTraceRays(recorder_, table.handle, at.raygen.offset, table.handle, at.miss.offset,
-                            at.miss.stride, hit.empty() ? VK_NULL_HANDLE : table.handle, at.hit.offset,
-                            at.hit.stride, VK_NULL_HANDLE, 0, 0, uint32_t(rays.size()), 1, 1),
-            "rtrCmdTraceRays");
-        tools::full_barrier(commands);
-    });
-    RtrLaunchError problem{};
-    if (rtrGetLaunchError(recorder_, 0, control_.mapped, &problem) != VK_SUCCESS) {
-        char text[256];
-        rtrFormatLaunchError(&problem, text, sizeof text);
-        throw Error(std::string("launch error: ") + text);
+    for (bool finished = false; !finished;) {
+        context.run([&](VkCommandBuffer commands) {
+            device_.check(rtrBeginRecorder(recorder_, commands), "rtrBeginRecorder");
+            if (heap) device_.check(rtrCmdSetHeap(recorder_, heap), "rtrCmdSetHeap");
+            device_.check(rtrCmdSetLaunchLimits(recorder_, 0, rounds_), "rtrCmdSetLaunchLimits");
+            if (scratch_.handle)
+                device_.check(rtrCmdSetLaunchScratch(recorder_, scratch_.handle, 0, scratch_.size),
+                              "rtrCmdSetLaunchScratch");
+            device_.check(rtrCmdBindPipeline(recorder_, pipeline_), "rtrCmdBindPipeline");
+            device_.check(rtrCmdBindDescriptorSets(recorder_, 0, 1, &set_, 0, nullptr),
+                          "rtrCmdBindDescriptorSets");
+            device_.check(
+                rtrCmdTraceRays(recorder_, table.handle, at.raygen.offset, table.handle, at.miss.offset,
+                                at.miss.stride, hit.empty() ? VK_NULL_HANDLE : table.handle, at.hit.offset,
+                                at.hit.stride, VK_NULL_HANDLE, 0, 0, uint32_t(rays.size()), 1, 1),
+                "rtrCmdTraceRays");
+            tools::full_barrier(commands);
+        });
+        RtrLaunchError problem{};
+        finished = rtrGetLaunchError(recorder_, 0, control_.mapped, &problem) == VK_SUCCESS;
+        if (!finished && (problem.code != RTC_LAUNCH_ERROR_UNFINISHED || rounds_ >= kMostRounds)) {
+            char text[256];
+            rtrFormatLaunchError(&problem, text, sizeof text);
+            throw Error(std::string("launch error: ") + text);
+        }
+        if (!finished) {
+            device_.messages.clear();
+            device_.check(rtrRetireRecorder(recorder_), "rtrRetireRecorder");
+            make_recorder(rounds_ * 8);
+        }
     }
     device_.check(rtrRetireRecorder(recorder_), "rtrRetireRecorder");
     std::vector<Hit> hits(rays.size());

@@ -15,14 +15,16 @@ namespace rtc::stress {
 // The runtime with host allocations counted and its messages kept.
 class Device {
   public:
-    // `addresses`: address mode, for a context with device addresses.
-    Device(const tools::Context& context, bool addresses);
+    // `addresses`: address mode, for a context with device addresses. `budget`: RtrTraceOptions::stepBudget, RTR_DEFAULT:
+    // what the device recommends, and kStepBudget where it recommends none.
+    Device(const tools::Context& context, bool addresses, uint32_t budget);
     ~Device();
     Device(const Device&) = delete;
     Device& operator=(const Device&) = delete;
 
     const tools::Context& context;
     const bool addresses;
+    uint32_t step_budget;
     RtrDevice handle = nullptr;
     RtrPhysicalDeviceSupport support{};
     void check(VkResult result, const char* call);  // throws tools::Error with the runtime's words
@@ -37,6 +39,9 @@ class Device {
     VkAllocationCallbacks callbacks_{};
     long long live_ = 0;
 };
+
+// A dispatch of turns that took seconds would lose a GPU to its watchdog, and one ray through a pile can do that.
+constexpr uint32_t kStepBudget = 1u << 17;
 
 struct Hit {  // as the shader writes it
     float t;
@@ -64,7 +69,9 @@ class Tracer {
                            const std::vector<float>& boxes, const std::vector<Ray>& rays);
 
   private:
+    void make_recorder(uint32_t rounds);
     Device& device_;
+    uint32_t rounds_ = 0;
     RtrPipeline pipeline_ = nullptr;
     RtrRecorder recorder_ = nullptr;
     VkDescriptorSetLayout layout_ = VK_NULL_HANDLE;

@@ -519,6 +519,22 @@ void World::make_top() {
 
 void World::step() {
     history_ = "step " + std::to_string(counts_.steps) + ":";
+    try {
+        take_step();
+    } catch (const std::exception& e) {
+        const std::string text = e.what();
+        if (text.rfind(history_, 0) == 0) throw;
+        throw Error(history_ + "\n" + text);
+    }
+}
+
+std::string World::describe_step() const {
+    char seconds[100];
+    std::snprintf(seconds, sizeof seconds, " (device %.2f s, reference %.2f s)", trace_seconds_, reference_seconds_);
+    return history_ + seconds;
+}
+
+void World::take_step() {
     const uint64_t operations = 1 + below(random_, 3);
     for (uint64_t i = 0; i < operations; ++i) {
         if (bottoms_.empty() || (bottoms_.size() < 8 && chance(random_, 0.4))) {
@@ -530,6 +546,7 @@ void World::step() {
         }
     }
     make_top();
+    history_ += " trace";
     trace();
     ++counts_.steps;
     counts_.most_primitives = std::max(counts_.most_primitives, primitives());

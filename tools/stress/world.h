@@ -42,6 +42,7 @@ class World {
 
     // Some random operations, then rays against the reference. Throws tools::Error at the first difference.
     void step();
+    std::string describe_step() const;  // the last one: operations, seconds
     const Counts& counts() const { return counts_; }
     // Destroys everything; throws unless the heap is whole again.
     void finish();
@@ -107,7 +108,9 @@ class World {
     int next_key_ = 0, in_use_ = -1;
     std::unique_ptr<Top> top_;
     Counts counts_;
+    void take_step();
     std::string history_;  // of the current step, for messages
+    double trace_seconds_ = 0, reference_seconds_ = 0;
 };
 
 }  // namespace rtc::stress
