@@ -55,6 +55,8 @@ VkResult rtr_check_chain(RtrDevice device, const char* owner, const void* next) 
                      owner, (int)((const VkBaseInStructure*)next)->sType);
 }
 
+VkBool32 rtrIsValidating(RtrDevice d) { return d->validation; }
+
 void rtrReportMessage(RtrDevice device, VkDebugUtilsMessageSeverityFlagBitsEXT severity, const char* id,
                       const char* text) {
     if (severity == VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT) {

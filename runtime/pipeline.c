@@ -114,6 +114,10 @@ static VkResult pick_options(RtrDevice d, const RtrModule* m, const RtrTraceOpti
                 "wrong; link it as resumable");
         o->stepBudget = 0;
     }
+    if (d->validation && !(m->header.flags & RTC_MODULE_CHECKED))
+        rtr_warning(d, "not-checked",
+                    "validation with a module that was not linked --checked: its traversal follows damaged memory, and "
+                    "references to nothing where the scene is not declared");
     return VK_SUCCESS;
 }
 

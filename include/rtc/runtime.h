@@ -165,7 +165,9 @@ typedef struct RtrDeviceCreateInfo {
      * TRANSFER_DST, and launches more of the control region (rtrGetRecorderControlSize).
      * Damage inside of structures is the module's to find: rtc --checked links a traversal that
      * follows nothing it has not checked (launch error BAD_MEMORY); it is told with each launch
-     * which structures are bound and not destroyed, and reads no other memory. */
+     * which structures are bound and not destroyed, and reads no other memory.
+     * rtrCreateRayTracingPipelineFromStages links that one by itself; pipelines of other modules
+     * get the warning not-checked. */
     VkBool32 validation;
     /* What `device` was created with, read during this call: a pipeline whose module needs a
      * feature or extension that is not in it is then refused by name. NULL: only what the
@@ -198,6 +200,9 @@ RTR_API void rtrGetRayTracingPipelineProperties(RtrDevice device,
                                                 VkPhysicalDeviceRayTracingPipelinePropertiesKHR* pProperties);
 RTR_API void rtrGetAccelerationStructureProperties(
     RtrDevice device, VkPhysicalDeviceAccelerationStructurePropertiesKHR* pProperties);
+
+/* Whether the device was created with RtrDeviceCreateInfo::validation. No counterpart. */
+RTR_API VkBool32 rtrIsValidating(RtrDevice device);
 
 /* Sends a message to the device's messenger, for code that sits on top of the runtime.
  * severity: ERROR or WARNING; id: a stable name. */

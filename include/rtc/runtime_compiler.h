@@ -119,7 +119,8 @@ static inline VkResult rtr_add_group(RtrDevice device, rtcc_pipeline_t pipeline,
 
 /* Links the stages into a module and makes a pipeline of it. Group n of pCreateInfo is group
  * n of the pipeline. Compiler messages go to the device's messenger. pCreateInfo's `layout`
- * and base pipeline are ignored. Thread-safe as rtcc_compile_pipeline is.
+ * and base pipeline are ignored. On a device with validation the checking variant of traversal is
+ * linked (rtcc_options_set_checked). Thread-safe as rtcc_compile_pipeline is.
  * Counterpart: vkCreateRayTracingPipelinesNV (one pipeline a call).
  * Errors: VALIDATION_FAILED with a message for what cannot be compiled or linked; those of
  * rtrCreateRayTracingPipeline. */
@@ -145,6 +146,8 @@ static inline VkResult rtrCreateRayTracingPipelineFromStages(RtrDevice device, V
                                                           ? pCreateInfo->maxRecursionDepth
                                                           : 1) != RTCC_STATUS_SUCCESS)
         r = rtr_stages_error(device, "recursion-limit", "maxRecursionDepth must be 31 or less");
+    if (r == VK_SUCCESS && rtrIsValidating(device) && rtcc_options_set_checked(options, 1) != RTCC_STATUS_SUCCESS)
+        r = VK_ERROR_OUT_OF_HOST_MEMORY;
     if (r == VK_SUCCESS) {
         result = rtcc_compile_pipeline(pStages->compiler, pipeline, options);
         if (!result) r = VK_ERROR_OUT_OF_HOST_MEMORY;

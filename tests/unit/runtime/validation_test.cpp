@@ -107,4 +107,20 @@ TEST_F(ValidationTest, BadTablesDoNot) {
     EXPECT_NE(std::string(text).find("the miss region"), std::string::npos) << text;
 }
 
+TEST_F(ValidationTest, ModulesThatDoNotCheckAreNamed) {
+    make_set(3);
+    RtcModuleHeader h = module_header(1u << RTC_BINDING_PARAMS | 1u << RTC_BINDING_HEAP_TEXELS |
+                                          1u << RTC_BINDING_HEAP | 1u << RTC_BINDING_CONTROL,
+                                      2);
+    for (const bool checked : {false, true}) {
+        h.flags = checked ? RTC_MODULE_CHECKED : 0;
+        unchecked = 0;
+        ASSERT_EQ(make_pipeline(with_reflection(module_trace_spv, sizeof module_trace_spv, h, "{}"), 4), VK_SUCCESS);
+        if (rtrGetDeviceSupport(rtr)->needsResumableModules) expect_runtime_error("not-resumable");
+        EXPECT_EQ(unchecked, checked ? 0u : 1u);
+        rtrDestroyPipeline(rtr, pipeline, nullptr);
+        pipeline = nullptr;
+    }
+}
+
 }  // namespace

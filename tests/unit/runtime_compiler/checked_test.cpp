@@ -56,19 +56,21 @@ class CheckedTest : public StagesTest, public ::testing::WithParamInterface<bool
         make_table();
         sound.assign(scene->heap_buffer.as<uint32_t>(), scene->heap_buffer.as<uint32_t>() + scene->heap_buffer.size / 4);
     }
-    void make_pipeline(bool checked, rtcc_accuracy accuracy = RTCC_ACCURACY_WATERTIGHT) {
+    void make_pipeline(bool checked, rtcc_accuracy accuracy = RTCC_ACCURACY_WATERTIGHT, RtrDevice of = nullptr) {
         rtrDestroyPipeline(rtr, pipeline, nullptr);
         pipeline = nullptr;
         auto options = rtcc_options_create();
         rtcc_options_set_checked(options, checked);
         rtcc_options_set_accuracy(options, accuracy);
         rtcc_options_set_addressing(options, GetParam() ? RTCC_ADDRESSING_ADDRESS : RTCC_ADDRESSING_HEAP);
+        if (of) std::swap(rtr, of);
         const VkResult r = create(options);
+        if (of) std::swap(rtr, of);
         rtcc_options_release(options);
         ASSERT_EQ(r, VK_SUCCESS);
         RtrPipelineInfo info;
         rtrGetPipelineInfo(pipeline, &info);
-        ASSERT_EQ((info.moduleFlags & RTC_MODULE_CHECKED) != 0, checked);
+        ASSERT_EQ((info.moduleFlags & RTC_MODULE_CHECKED) != 0, checked || !of);
     }
     void make_table() {
         RtrSbtRecord raygen{0, 0, nullptr}, miss{1, 0, nullptr}, hit{2, 0, nullptr};
@@ -181,11 +183,33 @@ TEST_P(CheckedTest, DamageIsNamed) {
 TEST_P(CheckedTest, SoundScenesLookTheSame) {
     ASSERT_EQ(launch_rays().code, RTC_LAUNCH_ERROR_NONE);
     const std::vector<uint32_t> hits(result.as<uint32_t>(), result.as<uint32_t>() + kRays);
-    make_pipeline(false);
+    // Without validation the pipeline is what its options say.
+    RtrDeviceCreateInfo info{};
+    info.instance = vk->instance;
+    info.physicalDevice = vk->physical_device;
+    info.device = vk->device;
+    info.pfnGetInstanceProcAddr = vk->get_instance_proc_addr;
+    info.bufferDeviceAddress = GetParam();
+    RtrDevice plain = nullptr;
+    ASSERT_EQ(rtrCreateDevice(&info, nullptr, &plain), VK_SUCCESS);
+    EXPECT_FALSE(rtrIsValidating(plain));
+    EXPECT_TRUE(rtrIsValidating(rtr));
+    make_pipeline(false, RTCC_ACCURACY_WATERTIGHT, plain);
     make_table();
     memset(result.data, 0, 4 * kRays);
     ASSERT_EQ(launch_rays().code, RTC_LAUNCH_ERROR_NONE);
     EXPECT_EQ(memcmp(result.data, hits.data(), 4 * kRays), 0);
+    rtrDestroyPipeline(plain, pipeline, nullptr);
+    pipeline = nullptr;
+    rtrDestroyDevice(plain, nullptr);
+}
+
+// A device that validates asks for the checking traversal, whatever the options say.
+TEST_P(CheckedTest, ValidationLinksIt) {
+    make_pipeline(false);
+    RtrPipelineInfo info;
+    rtrGetPipelineInfo(pipeline, &info);
+    EXPECT_NE(info.moduleFlags & RTC_MODULE_CHECKED, 0u);
 }
 
 // What the next test is about; the launch declares no scene, so that nothing but the traversal looks.
