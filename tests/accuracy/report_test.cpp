@@ -73,7 +73,7 @@ TEST(Report, ZeroComesWithItsBound) {
 
 TEST(Report, NamesWhoIsDominated) {
     // native is slower than watertight and leaks more; fast is cheapest, watertight is best.
-    EXPECT_EQ(dominated(example()), std::vector<std::string>{"native"});
+    EXPECT_EQ(dominated(example().subjects), std::vector<std::string>{"native"});
 }
 
 TEST(Report, LaterRunsOfADeviceReplaceEarlierOnes) {
@@ -100,6 +100,107 @@ TEST(Report, PictureHasEverySubjectAndMarksBounds) {
     EXPECT_EQ(svg.find("inf"), std::string::npos);
     const DeviceReport nothing{"<none>", true, {}};
     EXPECT_NE(plot_svg(nothing).find("&lt;none&gt;"), std::string::npos);
+}
+
+Json agreement(uint64_t other, double t_p999, double t_p50 = 0.4) {
+    Json rows;
+    for (const char* axis : {"offset", "all"})
+        rows.push_back({{"axis", axis}, {"rays", 5000}, {"hits", 4000}, {"missed", 0}, {"invented", 0}, {"other", other},
+                        {"of_these_denormal", 0}, {"by_rule", 0}, {"missed_plainly", 0}, {"invented_plainly", 0}, {"later", 0},
+                        {"t_ulp_p50", t_p50}, {"t_ulp_p99", 1.0}, {"t_ulp_p99_9", t_p999}, {"t_ulp_max", 9.0}});
+    return rows;
+}
+
+Json run(const char* device, std::vector<Json> tiers) { return {{"device", device}, {"by_cpu", true}, {"tiers", tiers}}; }
+
+Json full(const char* name, uint64_t edge_events, uint64_t other = 0, double ratio = 1) {
+    Json tier = subject(name, 1e-3, ratio, edge_events);
+    for (Json& row : tier["leaks"]) row.update(Json{{"axis", "mesh"}, {"value", "closed"}, {"mesh", "knot"}});
+    tier["leaks"][3]["value"] = "far";
+    tier["agreement"] = agreement(other, 0.5);
+    return tier;
+}
+
+TEST(Chance, IsBinomial) {
+    EXPECT_DOUBLE_EQ(chance({0, 100}, {0, 100}), 1);
+    EXPECT_NEAR(chance({0, 1000}, {5, 1000}), 2 * std::pow(0.5, 5), 1e-12);
+    EXPECT_NEAR(chance({0, 3000}, {2, 1000}), 1.0 / 16, 1e-12);  // both in the one quarter of the rays
+    EXPECT_GT(chance({4000, 10000}, {40500, 100000}), 0.01);
+    EXPECT_LT(chance({4000, 10000}, {50000, 100000}), 1e-9);
+}
+
+TEST(Check, ARunAgreesWithItselfAndWithinNoise) {
+    const Json then = run("llvmpipe (LLVM 15, 256 bits) x", {full("fast", 300, 50), full("watertight", 0, 20, 1.1)});
+    EXPECT_TRUE(compare_runs({then}, {then}).disagreements.empty());
+    EXPECT_GT(compare_runs({then}, {then}).compared, 20u);
+    // Another processor, other counts, other noise.
+    const Json now = run("llvmpipe (LLVM 15, 512 bits) x", {full("fast", 330, 60), full("watertight", 0, 12, 1.19)});
+    const Verdict verdict = compare_runs({now}, {then});
+    EXPECT_TRUE(verdict.disagreements.empty()) << verdict.disagreements.front();
+    EXPECT_TRUE(verdict.notes.empty());
+}
+
+TEST(Check, NamesWhatDisagrees) {
+    const Json then = run("a", {full("fast", 300, 50), full("watertight", 0, 20, 1.1), full("exact", 0)});
+    auto only = [&](const Json& now) {
+        const Verdict verdict = compare_runs({now}, {then});
+        EXPECT_EQ(verdict.disagreements.size(), 1u);
+        return verdict.disagreements.empty() ? std::string() : verdict.disagreements[0];
+    };
+    EXPECT_NE(only(run("a", {full("fast", 500, 50)})).find("leaks mesh closed knot edge unbalanced: 500 of 3000, before 300 of 3000"),
+              std::string::npos);
+    EXPECT_NE(only(run("a", {full("watertight", 1, 20, 1.1)})).find("1 leaks or double hits where none are promised"),
+              std::string::npos);
+    EXPECT_NE(only(run("a", {full("exact", 0, 1)})).find("1 first hits other"), std::string::npos);
+    Json slow = full("watertight", 0, 20, 1.1);
+    slow["cost"][1]["against_first"] = 1.3;
+    EXPECT_NE(only(run("a", {slow})).find("random, time over the first's: 1.3, before 1.1"), std::string::npos);
+    Json blind = full("contracted", 0);
+    blind["leaks"][3]["unbalanced"] = 0;
+    EXPECT_NE(only(run("a", {blind})).find("does not leak"), std::string::npos);
+}
+
+TEST(Check, PromisesHoldWhereNothingIsCheckedIn) {
+    const Json then = run("a", {full("fast", 300, 50)});
+    const Verdict fine = compare_runs({run("b", {full("watertight", 0)})}, {then});
+    EXPECT_TRUE(fine.disagreements.empty());
+    EXPECT_EQ(fine.notes.size(), 1u);
+    EXPECT_EQ(compare_runs({run("b", {full("watertight", 3)})}, {then}).disagreements.size(), 1u);
+    EXPECT_EQ(compare_runs({}, {then}).disagreements.size(), 1u) << "nothing compared";
+}
+
+TEST(Report, LeaksAndDoubleHitsAreToldApart) {
+    Json tier = full("fast", 300);
+    tier["leaks"][1].update(Json{{"looked_at", 48}, {"of_these_leaks", 36}, {"of_these_doubles", 10}, {"seconds", 0.003}});
+    const DeviceReport report = summarise({run("a", {tier})}).at(0);
+    EXPECT_DOUBLE_EQ(report.subjects[0].leaks, 300.0 * 36 / 48 / 6000);
+    EXPECT_DOUBLE_EQ(report.subjects[0].doubles, 300.0 * 10 / 48 / 6000);
+    EXPECT_DOUBLE_EQ(report.subjects[0].aimed_speed, 1);
+    EXPECT_NE(markdown_table(report, "").find("| 3.8e+07 | 1e+07 |"), std::string::npos);
+    EXPECT_NE(markdown_table(report, "").find("| mesh | 0.033 |"), std::string::npos) << "by axis";
+}
+
+TEST(Report, KnobsHaveATableOfTheirOwn) {
+    Json small = full("box16", 0, 20, 1.1), slow = full("t64", 0, 20, 1.3);
+    for (Json& row : small["cost"]) row["scene_bytes"] = 50000;
+    for (Json& row : slow["cost"]) row["seconds"] = 2e-3;
+    const DeviceReport report = summarise({run("a", {full("fast", 300, 50), full("watertight", 0, 20, 1.1), small, slow})}).at(0);
+    EXPECT_EQ(report.subjects.size(), 2u);
+    ASSERT_EQ(report.knobs.size(), 3u);
+    EXPECT_EQ(report.knobs[0].name, "watertight");
+    EXPECT_EQ(dominated(report.knobs, true), (std::vector<std::string>{"watertight", "t64"})) << "box16 is smaller";
+    EXPECT_EQ(dominated(report.knobs, false), (std::vector<std::string>{"t64"}));
+    const std::string table = knob_table(report);
+    EXPECT_NE(table.find("| `t64` | 1.18 |"), std::string::npos) << table;
+    EXPECT_EQ(markdown_table(report, "").find("box16"), std::string::npos);
+    EXPECT_EQ(knob_table(example()), "");
+}
+
+TEST(Report, NoiseDominatesNobody) {
+    // Slower by 1 %, fewer events by chance.
+    Json a = full("fast", 300), b = full("watertight", 310);
+    for (Json& row : b["cost"]) row["seconds"] = 0.99e-3;
+    EXPECT_TRUE(dominated(summarise({run("a", {a, b})}).at(0).subjects).empty());
 }
 
 TEST(Embree, SeesWhatRtcSees) {

@@ -80,9 +80,10 @@ int agree_command(int argc, char** argv) {
     app.add_option("--tier", tiers, "exact, exact64, watertight, fast, contracted; several with commas")->delimiter(',');
     app.add_option("--device", device, "device index or part of its name");
     app.add_option("--axes", settings.axes, "some of the axes; several with commas")->delimiter(',');
-    app.add_option("--rays", settings.rays, "for each tier, over all axes in equal shares");
+    app.add_option("--rays", settings.rays, "for each tier, over all axes in equal shares")->check(some_rays());
     app.add_option("--threads", settings.threads, "of the host; 0: all cores");
-    app.add_option("--seconds", settings.seconds, "stop each tier after about this long, with fewer rays everywhere");
+    app.add_option("--seconds", settings.seconds, "stop each tier after about this long, with fewer rays everywhere")
+        ->check(tools::number_between(0, 1e9));
     app.add_option("--json", json_path, "write all figures");
     app.add_option("--markdown", markdown_path, "write the tables");
     app.add_flag("--validate", validate, "run under the validation layers");
@@ -90,6 +91,7 @@ int agree_command(int argc, char** argv) {
     if (const int status = tools::parse_command_line(app, "rtc-accuracy agree", argc, argv); status >= 0) return status;
     for (const std::string& axis : settings.axes) exact_cases(axis);  // names what is wrong before anything runs
 
+    for (const std::string& path : {json_path, markdown_path}) require_writable(path);
     tools::ContextOptions context_options;
     context_options.device = device;
     context_options.validate = validate;

@@ -1,6 +1,7 @@
 #include "agreement.h"
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -50,6 +51,67 @@ class Histogram {
     uint64_t count_ = 0;
 };
 
+// Absolute errors in eight steps an octave, 2^-40 to 1.
+class FineHistogram {
+  public:
+    void add(double error) {
+        const double step = error > 0 ? std::ceil(8 * (std::log2(error) + 40)) : 0;
+        ++steps_[size_t(std::clamp(step, 0.0, double(steps_.size() - 1)))];
+        ++count_;
+    }
+    void add(const FineHistogram& more) {
+        for (size_t i = 0; i < steps_.size(); ++i) steps_[i] += more.steps_[i];
+        count_ += more.count_;
+    }
+    double percentile(double p) const {
+        uint64_t seen = 0;
+        for (size_t i = 0; i < steps_.size(); ++i) {
+            seen += steps_[i];
+            if (seen > 0 && double(seen) >= p * double(count_)) return i ? std::exp2(double(i) / 8 - 40) : 0;
+        }
+        return 0;
+    }
+
+  private:
+    std::vector<uint64_t> steps_ = std::vector<uint64_t>(8 * 40 + 1);
+    uint64_t count_ = 0;
+};
+
+// The object-space ray as traversal has it.
+ExactRay object_ray(const HostScene& scene, const Ray& ray, uint32_t instance) {
+    ExactRay object{ray.origin, ray.direction, ray.tmin, ray.tmax};
+    if (scene.instances[instance].object_to_world != kIdentity) {
+        object.origin = transform_point(scene.world_to_object[instance], ray.origin);
+        object.direction = transform_vector(scene.world_to_object[instance], ray.direction);
+    }
+    return object;
+}
+
+// How far (b1, b2) is from the weights of the second and third vertex; nothing where long doubles do not tell.
+std::optional<double> weights_off(const ExactRay& ray, const Triangle& triangle, float b1, float b2) {
+    long double v[3][3], s[3], size = 0, sum = 0;
+    for (int k = 0; k < 3; ++k)
+        for (int i = 0; i < 3; ++i) v[k][i] = static_cast<long double>(triangle[k][i]) - ray.origin[i];
+    for (int k = 0; k < 3; ++k) {
+        const long double *a = v[(k + 1) % 3], *b = v[(k + 2) % 3];
+        s[k] = 0;
+        for (int i = 0; i < 3; ++i) {
+            const int j = (i + 1) % 3, l = (i + 2) % 3;
+            const long double p = a[j] * b[l] * ray.direction[i], q = a[l] * b[j] * ray.direction[i];
+            s[k] += p - q;
+            size += std::fabs(p) + std::fabs(q);
+        }
+        sum += s[k];
+    }
+    if (!(std::fabs(sum) * 0x1p-30L > size * 0x1p-60L)) return {};
+    return std::max(std::fabs(double(s[1] / sum - b1)), std::fabs(double(s[2] / sum - b2)));
+}
+
+struct Errors {
+    Histogram t;
+    FineHistogram weights;
+};
+
 // One coordinate in 1e5 of size 1e-33 is a denormal.
 bool has_denormal(const Ray& ray) {
     for (const Vec3& v : {ray.origin, ray.direction})
@@ -63,17 +125,12 @@ bool touches_edge(const HostScene& scene, const Ray& ray, const RayResult& hit) 
     const Instance& instance = scene.instances.at(hit.instance);
     const auto& geometries = scene.blases.at(instance.blas).geometries;
     if (hit.geometry >= geometries.size() || hit.primitive >= geometries[hit.geometry].triangles.size()) return false;
-    ExactRay object{ray.origin, ray.direction, ray.tmin, ray.tmax};
-    if (instance.object_to_world != kIdentity) {
-        object.origin = transform_point(scene.world_to_object[hit.instance], ray.origin);
-        object.direction = transform_vector(scene.world_to_object[hit.instance], ray.direction);
-    }
     mpq_class t;
-    return intersect(object, geometries[hit.geometry].triangles[hit.primitive], &t) == Verdict::Boundary;
+    return intersect(object_ray(scene, ray, hit.instance), geometries[hit.geometry].triangles[hit.primitive], &t) == Verdict::Boundary;
 }
 
 void compare(const ExactCase& c, const HostScene& scene, const std::vector<Ray>& rays, const std::vector<RayResult>& got,
-             const std::vector<std::optional<OracleHit>>& expected, AgreementRow& row, Histogram& errors) {
+             const std::vector<std::optional<OracleHit>>& expected, AgreementRow& row, Errors& errors) {
     row.rays += rays.size();
     for (size_t i = 0; i < rays.size(); ++i) {
         const auto& e = expected[i];
@@ -88,7 +145,13 @@ void compare(const ExactCase& c, const HostScene& scene, const std::vector<Ray>&
             if (denormal || std::fabs(e->t) < std::numeric_limits<float>::min()) continue;  // a t that devices flush
             const double error = std::fabs(double(g.t) - e->t) / ulp(e->t);
             row.t_max = std::max(row.t_max, error);
-            errors.add(error);
+            errors.t.add(error);
+            const Triangle& triangle = scene.blases[scene.instances[e->instance].blas].geometries[e->geometry].triangles[e->primitive];
+            if (const auto off = weights_off(object_ray(scene, rays[i], e->instance), triangle, std::bit_cast<float>(g.attr0),
+                                             std::bit_cast<float>(g.attr1))) {
+                errors.weights.add(*off);
+                row.b_max = std::max(row.b_max, *off);
+            }
             continue;
         }
         row.missed += e && !hit;
@@ -101,6 +164,11 @@ void compare(const ExactCase& c, const HostScene& scene, const std::vector<Ray>&
         row.missed_plainly += !denormal && !rule && e && !hit;
         row.invented_plainly += !denormal && !rule && !e && hit;
         row.later += !denormal && !rule && e && hit && double(g.t) > e->t;
+        if (!denormal && !rule && e) {
+            const Triangle& triangle = scene.blases[scene.instances[e->instance].blas].geometries[e->geometry].triangles[e->primitive];
+            const double margin = std::fabs(inside_margin(object_ray(scene, rays[i], e->instance), triangle));
+            if (std::isfinite(margin)) row.margin = std::max(row.margin, margin);
+        }
         if (denormal || !row.first.empty()) continue;
         char text[400];
         std::snprintf(text, sizeof text, "%s: o %a %a %a d %a %a %a t %a to %a", c.value.c_str(), rays[i].origin.x,
@@ -112,7 +180,7 @@ void compare(const ExactCase& c, const HostScene& scene, const std::vector<Ray>&
 
 // One case; `allowed` seconds at most, roughly.
 void measure_case(RayTracer& tracer, const ExactCase& c, uint64_t share, double allowed, unsigned threads,
-                  AgreementRow& row, Histogram& errors) {
+                  AgreementRow& row, Errors& errors) {
     const Clock::time_point start = Clock::now();
     const HostScene scene = build_scene(c.blases, c.instances, c.build);
     tracer.set_scene(scene);
@@ -162,6 +230,8 @@ void AgreementRow::add(const AgreementRow& more) {
     device_seconds += more.device_seconds;
     oracle_seconds += more.oracle_seconds;
     t_max = std::max(t_max, more.t_max);
+    b_max = std::max(b_max, more.b_max);
+    margin = std::max(margin, more.margin);
 }
 
 std::vector<AgreementRow> measure_agreement(RayTracer& tracer, const AgreementSettings& settings, AgreementRow* total) {
@@ -169,12 +239,19 @@ std::vector<AgreementRow> measure_agreement(RayTracer& tracer, const AgreementSe
     const Clock::time_point start = Clock::now();
     std::vector<AgreementRow> rows;
     AgreementRow all{.axis = "all"};
-    Histogram all_errors;
+    Errors all_errors;
+    auto percentiles = [](AgreementRow& row, const Errors& errors) {
+        row.t_p50 = errors.t.percentile(0.5);
+        row.t_p99 = errors.t.percentile(0.99);
+        row.t_p999 = errors.t.percentile(0.999);
+        row.b_p50 = errors.weights.percentile(0.5);
+        row.b_p999 = errors.weights.percentile(0.999);
+    };
     double said = 0;
     for (size_t n = 0; n < names.size(); ++n) {
         const std::vector<ExactCase> cases = exact_cases(names[n]);
         AgreementRow row{.axis = names[n], .cases = cases.size()};
-        Histogram errors;
+        Errors errors;
         const uint64_t axis_share = settings.rays / names.size();
         const uint64_t share = (axis_share + cases.size() - 1) / cases.size();
         for (size_t i = 0; i < cases.size(); ++i) {
@@ -191,16 +268,13 @@ std::vector<AgreementRow> measure_agreement(RayTracer& tracer, const AgreementSe
                 said = now;
             }
         }
-        row.t_p50 = errors.percentile(0.5);
-        row.t_p99 = errors.percentile(0.99);
-        row.t_p999 = errors.percentile(0.999);
-        all_errors.add(errors);
+        percentiles(row, errors);
+        all_errors.t.add(errors.t);
+        all_errors.weights.add(errors.weights);
         all.add(row);
         rows.push_back(row);
     }
-    all.t_p50 = all_errors.percentile(0.5);
-    all.t_p99 = all_errors.percentile(0.99);
-    all.t_p999 = all_errors.percentile(0.999);
+    percentiles(all, all_errors);
     if (total) *total = all;
     return rows;
 }

@@ -21,6 +21,8 @@ struct AgreementRow {
     uint64_t later = 0;                 // of `inverted`, but for the two above: the triangle hit lies beyond the first
     uint64_t ties = 0, on_edge = 0;     // rays that only a rule decides
     double t_p50 = 0, t_p99 = 0, t_p999 = 0, t_max = 0;  // ulps, cases without denormals
+    double b_p50 = 0, b_p999 = 0, b_max = 0;             // of the barycentrics, absolute; of the same hits
+    double margin = 0;                                   // how far from an edge a difference that no rule excuses lies, at most
     std::string first;                                   // the first difference, as hexadecimal floats
     OracleCounts oracle;                                 // what it needed rationals for
     double device_seconds = 0, oracle_seconds = 0;       // wall time; both run at the same time

@@ -168,14 +168,17 @@ int campaign_command(CampaignProgram program, int argc, char** argv) {
         ->delimiter(',');
     app.add_option("--device", device, "device index or part of its name");
     app.add_option("--rays", settings.rays, leaks ? "rays aimed at edges, and as many at vertices"
-                                                  : "rays aimed inside, and as many at edges and at vertices");
+                                                  : "rays aimed inside, and as many at edges and at vertices")
+        ->check(some_rays());
     if (leaks)
-        app.add_option("--beyond", settings.beyond, "the same for offsets of 1e5 to 1e8, where nothing is promised");
+        app.add_option("--beyond", settings.beyond, "the same for offsets of 1e5 to 1e8, where nothing is promised")
+            ->check(rays_or_none());
     else
         app.add_flag("--naive", settings.naive, "the control: second rays start where t says, and must hit themselves");
-    app.add_option("--seconds", settings.seconds, "stop each tier after about this long, with fewer rays everywhere");
+    app.add_option("--seconds", settings.seconds, "stop each tier after about this long, with fewer rays everywhere")
+        ->check(tools::number_between(0, 1e9));
     app.add_option("--seed", settings.seed, "the same seed makes the same rays");
-    app.add_option("--lanes", lanes, "rays of one launch");
+    app.add_option("--lanes", lanes, "rays of one launch")->check(tools::number_between(0, 1u << 28));
     app.add_option("--json", json_path, "write all figures");
     app.add_option("--markdown", markdown_path, "write the tables");
     app.add_flag("--validate", validate, "run under the validation layers");
@@ -183,6 +186,7 @@ int campaign_command(CampaignProgram program, int argc, char** argv) {
     const char* name = leaks ? "rtc-accuracy leaks" : "rtc-accuracy spawn";
     if (const int status = tools::parse_command_line(app, name, argc, argv); status >= 0) return status;
 
+    for (const std::string& path : {json_path, markdown_path}) require_writable(path);
     const std::vector<CampaignPoint> within = leaks ? campaign_points(false) : spawn_points();
     const std::vector<CampaignPoint> beyond = settings.beyond ? campaign_points(true) : std::vector<CampaignPoint>();
     std::string text;

@@ -104,8 +104,9 @@ void measure_axis(RayTracer& tracer, const std::string& axis, uint64_t rays, std
             LeakRow row{axis, point.value, point.mesh.name, aim_name(aim), point.promised, {}};
             // Half from inside where inside is known.
             // At offsets of 1e7 and more nothing lies inside a sphere of a few ulps.
-            const bool convex =
-                point.mesh.name == "icosphere" && axis != "distance" && std::fabs(point.c.centre.x) < 5e6;
+            double far = std::fabs(point.c.centre.x);
+            for (const auto& row : point.c.instance.object_to_world) far = std::max(far, double(std::fabs(row[3])));
+            const bool convex = point.mesh.name == "icosphere" && axis != "distance" && far < 5e6;
             point.c.from_inside = false;
             row.counts = count_leaks(tracer, point.c, convex ? rays / 2 : rays);
             if (convex) {
@@ -184,17 +185,30 @@ static double median(std::vector<double> values) {
     return values.size() % 2 ? values[half] : (values[half - 1] + values[half]) / 2;
 }
 
-void measure_cost(const std::vector<CostSubject>& subjects, uint64_t rays, unsigned repeats) {
+void measure_cost(const std::vector<CostSubject>& all, uint64_t rays, unsigned repeats) {
     const IndexedMesh knot = make_torus_knot(2000, 50);
     const HostScene scene = build_scene({Blas{{{knot.soup(), {}, true}}}}, {{}});
-    for (const CostSubject& subject : subjects) subject.tracer->set_scene(scene);
+    std::vector<CostSubject> subjects = all;
+    // One that cannot must not take the others' figures with it.
+    auto each = [&](auto&& work) {
+        for (size_t i = 0; i < subjects.size(); ++i) {
+            if (!subjects[i].report->cost_problem.empty()) continue;
+            try {
+                work(i);
+            } catch (const tools::Error& problem) {
+                subjects[i].report->cost_problem = problem.what();
+                subjects[i].report->cost.clear();
+            }
+        }
+    };
+    each([&](size_t i) { subjects[i].tracer->set_scene(scene); });
     for (const bool coherent : {true, false}) {
         const std::vector<Ray> batch = cost_rays(coherent, rays);
         std::vector<std::vector<double>> times(subjects.size());
         std::vector<CostRow> rows(subjects.size());
         // One after the other, again and again: what else the machine does, and how warm it is, is the same for all.
         for (unsigned repeat = 0; repeat <= repeats; ++repeat) {
-            for (size_t i = 0; i < subjects.size(); ++i) {
+            each([&](size_t i) {
                 const std::clock_t before = std::clock();
                 const auto results = subjects[i].tracer->trace(batch);
                 const double cpu = double(std::clock() - before) / CLOCKS_PER_SEC;
@@ -205,9 +219,11 @@ void measure_cost(const std::vector<CostSubject>& subjects, uint64_t rays, unsig
                 } else {
                     times[i].push_back(subjects[i].by_cpu ? cpu : subjects[i].tracer->seconds);
                 }
-            }
+            });
         }
-        for (size_t i = 0; i < subjects.size(); ++i) {
+        size_t first = 0;
+        while (first < subjects.size() && !subjects[first].report->cost_problem.empty()) ++first;
+        each([&](size_t i) {
             CostRow& row = rows[i];
             row.workload = coherent ? "primary" : "random";
             row.triangles = knot.triangles.size();
@@ -215,11 +231,11 @@ void measure_cost(const std::vector<CostSubject>& subjects, uint64_t rays, unsig
             row.by_cpu = subjects[i].by_cpu;
             row.seconds = median(times[i]);
             std::vector<double> ratios;
-            for (size_t k = 0; k < times[i].size(); ++k) ratios.push_back(times[i][k] / times[0][k]);
+            for (size_t k = 0; k < times[i].size(); ++k) ratios.push_back(times[i][k] / times[first][k]);
             row.against_first = median(ratios);
             row.scene_bytes = subjects[i].tracer->scene_bytes();
             subjects[i].report->cost.push_back(row);
-        }
+        });
     }
 }
 

@@ -47,6 +47,7 @@ struct Report {
     std::vector<CostRow> cost;
     SelfHits self_hits;
     std::string problem;  // why it could not be measured
+    std::string cost_problem;  // why its cost could not be
 };
 
 struct CostSubject {
@@ -60,7 +61,8 @@ const std::vector<std::string>& axis_names();
 
 void measure_axis(RayTracer& tracer, const std::string& axis, uint64_t rays, std::vector<LeakRow>& rows);
 void measure_culls(RayTracer& tracer, uint64_t rays, std::vector<CullRow>& rows);
-// Interleaved: every subject traces the same rays `repeats` times, in turns. Adds two rows to each report.
+// Interleaved: every subject traces the same rays `repeats` times, in turns. Adds two rows to each report, or says in it
+// why not: who throws is left out from there on. Ratios are to the first that is left.
 void measure_cost(const std::vector<CostSubject>& subjects, uint64_t rays, unsigned repeats);
 
 }  // namespace rtc::lab

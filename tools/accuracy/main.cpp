@@ -7,6 +7,10 @@
 
 double rtc::lab::upper_bound(uint64_t events, uint64_t n) { return Rate{events, n}.bound(); }
 
+void rtc::lab::require_writable(const std::string& path) {
+    if (!path.empty() && !std::ofstream(path, std::ios::binary | std::ios::app)) throw rtc::tools::Error("cannot write " + path);
+}
+
 void rtc::lab::write_file(const std::string& path, const std::string& text) {
     std::ofstream file(path, std::ios::binary);
     file << text;
@@ -20,6 +24,7 @@ int main(int argc, char** argv) {
         if (command == "spawn") return rtc::lab::spawn_command(argc - 1, argv + 1);
         if (command == "agree") return rtc::lab::agree_command(argc - 1, argv + 1);
         if (command == "report") return rtc::lab::report_command(argc - 1, argv + 1);
+        if (command == "check") return rtc::lab::check_command(argc - 1, argv + 1);
         return rtc::lab::measure_command(argc, argv);
     });
 }

@@ -1,7 +1,9 @@
 // rtc-accuracy without a command: cost and errors of rtc's tiers, the device's own ray tracing and Embree on the same
 // rays, as one table and one plot.
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
+#include <ctime>
 #include <nlohmann/json.hpp>
 
 #include "campaign.h"
@@ -22,12 +24,6 @@ using Json = nlohmann::ordered_json;
 const std::vector<std::string> kAll = {"fast",       "watertight", "exact",       "exact64",
                                        "contracted", "native",     "embree-fast", "embree-robust",
                                        "box16", "box8", "float-inverse", "t64"};
-
-// Points beside the tiers, which no pipeline can be compiled for.
-bool is_knob(const std::string& name) {
-    const auto first = std::find(kAll.begin(), kAll.end(), "box16");
-    return std::find(first, kAll.end(), name) != kAll.end();
-}
 
 bool is_embree(const std::string& name) { return name == "embree-fast" || name == "embree-robust"; }
 
@@ -91,12 +87,13 @@ class Subject {
     bool by_cpu_ = false;
 };
 
-SelfHits measure_self_hits(const tools::Context& context, const std::string& subject, uint64_t rays) {
+SelfHits measure_self_hits(const tools::Context& context, const std::string& subject, uint64_t rays, double seconds) {
     const std::vector<CampaignPoint> points = spawn_points();
     const auto tracer = make_campaign_tracer(context, subject, CampaignProgram::Spawn, points);
     CampaignSettings settings;
     settings.program = CampaignProgram::Spawn;
     settings.rays = rays;
+    settings.seconds = seconds;
     settings.quiet = true;
     SelfHits sum;
     for (const CampaignRow& row : run_campaign(*tracer, points, false, settings).rows) {
@@ -110,6 +107,7 @@ SelfHits measure_self_hits(const tools::Context& context, const std::string& sub
 Json to_json(const Report& report) {
     Json json{{"tier", report.subject}};
     if (!report.problem.empty()) json["problem"] = report.problem;
+    if (!report.cost_problem.empty()) json["problem"] = "cost: " + report.cost_problem;
     for (const CostRow& r : report.cost)
         json["cost"].push_back({{"workload", r.workload},
                                 {"triangles", r.triangles},
@@ -127,6 +125,10 @@ Json to_json(const Report& report) {
                                  {"rays", r.counts.rays},
                                  {"unbalanced", r.counts.unbalanced},
                                  {"missed", r.counts.missed},
+                                 {"looked_at", r.counts.looked_at},
+                                 {"of_these_leaks", r.counts.leaks},
+                                 {"of_these_doubles", r.counts.doubles},
+                                 {"seconds", r.counts.seconds},
                                  {"bound_95", upper_bound(r.counts.unbalanced, r.counts.rays)},
                                  {"promised_zero", r.must_be_zero}});
     for (const CullRow& r : report.culls)
@@ -148,6 +150,10 @@ Json to_json(const Report& report) {
                                      {"t_ulp_p99", r.t_p99},
                                      {"t_ulp_p99_9", r.t_p999},
                                      {"t_ulp_max", r.t_max},
+                                     {"weights_p50", r.b_p50},
+                                     {"weights_p99_9", r.b_p999},
+                                     {"weights_max", r.b_max},
+                                     {"farthest_from_edge", r.margin},
                                      {"first_difference", r.first}});
     if (report.self_hits.rays)
         json["self_hits"] = {{"rays", report.self_hits.rays},
@@ -177,7 +183,7 @@ bool verdict(const Report& report) {
     }
     uint64_t differ = 0;
     for (const AgreementRow& r : report.agreement)
-        if (r.axis == "all") differ = r.different() - r.denormal;
+        if (r.axis == "all" || r.axis == "ordinary") differ += r.different() - r.denormal;
     if ((report.subject == "exact" || report.subject == "exact64") && differ) {
         std::fprintf(stderr, "rtc-accuracy: error: %s: %llu hits differ from exact arithmetic\n", report.subject.c_str(),
                      (unsigned long long)differ);
@@ -186,21 +192,63 @@ bool verdict(const Report& report) {
     return true;
 }
 
-void measure(Subject& subject, Report& report, const Settings& settings) {
-    for (const std::string& axis : settings.axes) measure_axis(subject.counting(), axis, settings.rays, report.leaks);
-    // Inflated boxes are rtc's trees'.
-    const bool own = report.subject != "native" && !is_embree(report.subject);
-    if (settings.cull_rays && own) measure_culls(subject.counting(), settings.cull_rays, report.culls);
-    if (settings.first_hits) {
+double seconds_since(std::chrono::steady_clock::time_point start) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// How many of `rays` can be measured in `seconds`, by a try with a few; 0 seconds: no limit.
+template <typename Run>
+uint64_t affordable(uint64_t rays, uint64_t few, double seconds, Run run) {
+    if (seconds <= 0 || rays <= few) return rays;
+    const auto start = std::chrono::steady_clock::now();
+    run(few);
+    return std::clamp(uint64_t(double(few) * seconds / seconds_since(start)), few, rays);
+}
+
+// `seconds`: about as long; 0: as long as it takes.
+void measure(Subject& subject, Report& report, const Settings& settings, double seconds) {
+    auto leaks = [&](uint64_t rays) {
+        report.leaks.clear();
+        for (const std::string& axis : settings.axes) measure_axis(subject.counting(), axis, rays, report.leaks);
+    };
+    auto culls = [&](uint64_t rays) {
+        report.culls.clear();
+        measure_culls(subject.counting(), rays, report.culls);
+    };
+    auto first_hits = [&](uint64_t rays) {
         AgreementSettings agreement;
-        agreement.rays = settings.first_hits;
+        agreement.rays = rays;
         agreement.quiet = true;
         AgreementRow total;
         report.agreement = measure_agreement(subject.first_hits(), agreement, &total);
         report.agreement.push_back(total);
-    }
+        agreement.axes = {"ordinary"};
+        report.agreement.push_back(measure_agreement(subject.first_hits(), agreement).at(0));
+    };
+    if (!settings.axes.empty()) leaks(affordable(settings.rays, 512, 0.45 * seconds, leaks));
+    // Inflated boxes are rtc's trees'.
+    const bool own = report.subject != "native" && !is_embree(report.subject);
+    if (settings.cull_rays && own) culls(affordable(settings.cull_rays, 256, 0.1 * seconds, culls));
+    if (settings.first_hits) first_hits(affordable(settings.first_hits, 8192, 0.3 * seconds, first_hits));
     if (settings.self_hits && subject.context() && !is_knob(report.subject))
-        report.self_hits = measure_self_hits(*subject.context(), report.subject, settings.self_hits);
+        report.self_hits = measure_self_hits(*subject.context(), report.subject, settings.self_hits, 0.15 * seconds);
+}
+
+// As it can be repeated: without paths and device, which are the reader's.
+std::string command_of(int argc, char** argv) {
+    std::string text = "`rtc-accuracy";
+    for (int i = 1; i < argc; ++i) {
+        const std::string argument = argv[i];
+        if (argument == "--json" || argument == "--markdown" || argument == "--plot" || argument == "--device") {
+            ++i;
+        } else if (argument != "--quiet") {
+            text += " " + argument;
+        }
+    }
+    const std::time_t now = std::time(nullptr);
+    char date[32];
+    std::strftime(date, sizeof date, "%Y-%m-%d", std::gmtime(&now));
+    return text + "`, " + date;
 }
 
 }  // namespace
@@ -211,7 +259,8 @@ int measure_command(int argc, char** argv) {
                  "rtc-accuracy leaks --help: campaigns whose rays the device makes.\n"
                  "rtc-accuracy spawn --help: self-hits of rays that leave surfaces.\n"
                  "rtc-accuracy agree --help: first hits against exact arithmetic.\n"
-                 "rtc-accuracy report --help: tables and plots from what --json wrote."};
+                 "rtc-accuracy report --help: tables and plots from what --json wrote.\n"
+                 "rtc-accuracy check --help: whether fresh runs agree with earlier ones."};
     std::vector<std::string> tiers = {"watertight"};
     std::string json_path, markdown_path, plot_path;
     Settings settings;
@@ -223,12 +272,15 @@ int measure_command(int argc, char** argv) {
     app.add_option("--device", settings.device, "device index or part of its name");
     app.add_option("--axes", settings.axes, "mesh, offset, size, aspect, distance, transform, zeros, all or none")
         ->delimiter(',');
-    app.add_option("--rays", settings.rays, "rays per point and aim");
-    app.add_option("--culls", settings.cull_rays, "rays per place for false box culls");
-    app.add_option("--first-hits", settings.first_hits, "rays against exact arithmetic, over all axes of `agree`");
-    app.add_option("--self-hits", settings.self_hits, "rays that leave surfaces, for each aim");
-    app.add_option("--cost", settings.cost_rays, "rays per workload for the cost");
-    app.add_option("--repeats", settings.repeats, "times that the cost is measured, in turns");
+    app.add_option("--rays", settings.rays, "rays per point and aim")->check(some_rays());
+    app.add_option("--culls", settings.cull_rays, "rays per place for false box culls")->check(rays_or_none());
+    app.add_option("--first-hits", settings.first_hits, "rays against exact arithmetic, over all axes of `agree`, and as many "
+                                                        "ordinary ones")->check(rays_or_none());
+    app.add_option("--self-hits", settings.self_hits, "rays that leave surfaces, for each aim")->check(rays_or_none());
+    app.add_option("--cost", settings.cost_rays, "rays per workload for the cost")->check(rays_or_none());
+    app.add_option("--seconds", settings.seconds, "fewer rays where that would take longer in all; costs come on top")
+        ->check(tools::number_between(0, 1e9));
+    app.add_option("--repeats", settings.repeats, "times that the cost is measured, in turns")->check(tools::number_between(1, 1e6));
     app.add_option("--json", json_path, "write all figures");
     app.add_option("--markdown", markdown_path, "write the table");
     app.add_option("--plot", plot_path, "write cost against error as SVG");
@@ -241,8 +293,15 @@ int measure_command(int argc, char** argv) {
     if (tiers == std::vector<std::string>{"all"}) tiers = kAll;
     if (settings.axes == std::vector<std::string>{"all"}) settings.axes = axis_names();
     if (settings.axes == std::vector<std::string>{"none"}) settings.axes.clear();
-    if (settings.rays == 0) throw Error("--rays must not be 0");
-    if (settings.repeats == 0) throw Error("--repeats must not be 0");
+    for (const std::string& axis : settings.axes)
+        if (std::find(axis_names().begin(), axis_names().end(), axis) == axis_names().end()) {
+            std::string known;
+            for (const std::string& name : axis_names()) known += name + ", ";
+            throw Error("unknown axis \"" + axis + "\": one of " + known + "all or none");
+        }
+    if (!plot_path.empty() && !plot_path.ends_with(".svg"))
+        throw Error("--plot writes SVG: \"" + plot_path + "\" does not end in .svg");
+    for (const std::string& path : {json_path, markdown_path, plot_path}) require_writable(path);
     for (const std::string& tier : tiers)
         if (std::find(kAll.begin(), kAll.end(), tier) == kAll.end()) {
             std::string known;
@@ -250,6 +309,8 @@ int measure_command(int argc, char** argv) {
             throw Error("unknown tier \"" + tier + "\": one of" + known.substr(1) + " or all");
         }
 
+    const auto start = std::chrono::steady_clock::now();
+    const std::string command = command_of(argc, argv);
     std::string device;
     bool by_cpu = true, good = true;
     std::vector<std::unique_ptr<Subject>> subjects(tiers.size());
@@ -276,26 +337,34 @@ int measure_command(int argc, char** argv) {
             by_cpu = subjects[i]->by_cpu();
         }
     }
+    if (std::none_of(subjects.begin(), subjects.end(), [](const auto& s) { return s != nullptr; }))
+        throw Error("nothing can be measured" + (reports[0].problem.empty() ? "" : ": " + reports[0].problem));
     if (settings.cost_rays) {
         std::vector<CostSubject> costs;
         for (size_t i = 0; i < tiers.size(); ++i)
             if (subjects[i]) costs.push_back({&subjects[i]->cost(), &reports[i], subjects[i]->by_cpu()});
         measure_cost(costs, settings.cost_rays, settings.repeats);
+        for (size_t i = 0; i < tiers.size(); ++i)
+            if (subjects[i] && !reports[i].cost_problem.empty()) {
+                std::fprintf(stderr, "rtc-accuracy: error: %s: cost: %s\n", tiers[i].c_str(), reports[i].cost_problem.c_str());
+                good = false;
+            }
     }
     auto results = [&] {
-        Json json{{"device", device.empty() ? "the host" : device}, {"by_cpu", by_cpu}};
+        Json json{{"device", device.empty() ? "the host" : device}, {"by_cpu", by_cpu}, {"command", command}};
         for (const Report& report : reports) json["tiers"].push_back(to_json(report));
         return json;
     };
     for (size_t i = 0; i < tiers.size(); ++i) {
         if (!settings.quiet) std::fprintf(stderr, "%s ...\n", tiers[i].c_str());
-        attempt(i, [&] { measure(*subjects[i], reports[i], settings); });
+        const double left = std::max(1.0, settings.seconds - seconds_since(start)) / double(tiers.size() - i);
+        attempt(i, [&] { measure(*subjects[i], reports[i], settings, settings.seconds > 0 ? left : 0); });
         good = verdict(reports[i]) && good;
         if (!json_path.empty()) write_file(json_path, results().dump(1) + "\n");  // long runs get interrupted
     }
     const Json json = results();
     const DeviceReport summary = summarise({json}).at(0);
-    const std::string table = markdown_table(summary, "");
+    const std::string table = markdown_table(summary, "") + "\n" + knob_table(summary);
     std::fputs(table.c_str(), stdout);
     if (!markdown_path.empty()) write_file(markdown_path, table);
     if (!plot_path.empty()) write_file(plot_path, plot_svg(summary));

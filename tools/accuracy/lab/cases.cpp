@@ -87,6 +87,14 @@ Make plain(const Transform& to_world = kIdentity, double distance = 3) {
 IndexedMesh spheroid() { return make_icosphere(3); }
 IndexedMesh knot() { return make_torus_knot(80, 12); }
 
+// Unit size, at the origin, random rays: what most of a picture is.
+void add_ordinary(std::vector<ExactCase>& cases) {
+    for (const IndexedMesh& mesh : {make_icosphere(4), make_torus_knot(400, 24)})
+        cases.push_back(mesh_case("ordinary", mesh.name, mesh, {}, 1, [](Shot& s) {
+            return towards(s.origin(), around({}, 1, s.random));
+        }));
+}
+
 void add_offset(std::vector<ExactCase>& cases) {
     for (int e = -1; e <= 8; ++e) {
         const double at = e < 0 ? 0 : std::pow(10.0, e);
@@ -433,12 +441,16 @@ std::vector<ExactCase> exact_cases(const std::string& axis) {
                                                        add_speed,   add_zeros, add_grazing, add_aim,
                                                        add_interval, add_transform, add_degenerate, add_build,
                                                        add_mixed};
+    if (axis == "ordinary") {
+        add_ordinary(cases);
+        return cases;
+    }
     const auto& names = exact_axis_names();
     const auto found = std::find(names.begin(), names.end(), axis);
     if (found == names.end()) {
         std::string known;
-        for (const std::string& name : names) known += (known.empty() ? "" : ", ") + name;
-        throw tools::Error("unknown axis \"" + axis + "\": " + known);
+        for (const std::string& name : names) known += name + ", ";
+        throw tools::Error("unknown axis \"" + axis + "\": " + known + "or ordinary");
     }
     adders[found - names.begin()](cases);
     return cases;

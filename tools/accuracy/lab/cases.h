@@ -24,6 +24,7 @@ struct ExactCase {
     bool denormal = false;
 };
 
+// `ordinary` is no part of these: it is for what most rays are.
 // offset, size, aspect, distance, speed, zeros, grazing, aim, interval, transform, degenerate, build, mixed.
 const std::vector<std::string>& exact_axis_names();
 std::vector<ExactCase> exact_cases(const std::string& axis);  // throws tools::Error: no such axis

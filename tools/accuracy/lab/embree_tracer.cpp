@@ -9,6 +9,7 @@
 #include <embree3/rtcore.h>
 
 #include <atomic>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <cstring>
@@ -188,6 +189,8 @@ class EmbreeTracer final : public RayTracer {
         result.instance = found ? (direct_ ? 0 : hit.hit.instID[0]) : kNoInstance;
         result.geometry = found ? hit.hit.geomID : 0;
         result.primitive = found ? hit.hit.primID : 0;
+        result.attr0 = std::bit_cast<uint32_t>(hit.hit.u);
+        result.attr1 = std::bit_cast<uint32_t>(hit.hit.v);
     }
 
     void clear() {

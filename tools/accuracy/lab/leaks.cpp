@@ -4,10 +4,13 @@
 #include <cmath>
 #include <limits>
 
+#include "campaign_rays.h"
+
 namespace rtc::lab {
 namespace {
 
 constexpr uint64_t kBatch = 1 << 17;
+constexpr uint64_t kLookedAt = 48;  // of a place; half a millisecond each
 
 Vec3 to_world(const Transform& m, const Vec3& p) {
     float out[3];
@@ -22,7 +25,9 @@ Vec3 to_world(const Transform& m, const Vec3& p) {
 void LeakCounts::add(const LeakCounts& more) {
     rays += more.rays;
     unbalanced += more.unbalanced;
+    looked_at += more.looked_at;
     leaks += more.leaks;
+    doubles += more.doubles;
     missed += more.missed;
     turns += more.turns;
     seconds += more.seconds;
@@ -76,15 +81,26 @@ std::vector<Ray> leak_rays(const LeakCase& c, uint64_t count, uint64_t batch) {
 
 LeakCounts count_leaks(RayTracer& tracer, const LeakCase& c, uint64_t total) {
     LeakCounts counts;
+    const Transform world_to_object = invert(c.instance.object_to_world);
+    std::vector<Triangle> triangles;
     for (uint64_t batch = 0; counts.rays < total; ++batch) {
         const std::vector<Ray> rays = leak_rays(c, std::min(kBatch, total - counts.rays), batch);
-        for (const RayResult& r : tracer.trace(rays)) {
+        const std::vector<RayResult> results = tracer.trace(rays);
+        for (size_t i = 0; i < rays.size(); ++i) {
+            const RayResult& r = results[i];
             const int64_t balance = int64_t(r.back) - int64_t(r.front);
             const int64_t expected = c.from_inside ? 1 : 0;
             counts.unbalanced += balance != expected;
-            counts.leaks += c.from_inside ? balance < expected : balance != expected;
             counts.missed += r.front + r.back == 0;
             counts.turns += r.turns;
+            if (balance == expected || counts.looked_at == kLookedAt) continue;
+            if (triangles.empty()) triangles = c.mesh->soup();
+            const ExactBalance exact = exact_balance(transform_point(world_to_object, rays[i].origin),
+                                                     transform_vector(world_to_object, rays[i].direction), triangles);
+            const uint32_t got = r.front + r.back, due = exact.front + exact.back;
+            counts.looked_at++;
+            counts.leaks += got < due;
+            counts.doubles += got > due;
         }
         counts.rays += rays.size();
         counts.seconds += tracer.seconds;

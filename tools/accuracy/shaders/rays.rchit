@@ -5,8 +5,11 @@ struct Payload {
     float t;
     uint kind, instance, primitive, geometry;
     uint front, back, ignore;
+    vec2 weights;
 };
 layout(location = 0) rayPayloadInEXT Payload found;
+
+hitAttributeEXT vec2 weights;
 
 void main() {
     found.t = gl_HitTEXT;
@@ -14,4 +17,5 @@ void main() {
     found.instance = gl_InstanceID;
     found.primitive = gl_PrimitiveID;
     found.geometry = gl_GeometryIndexEXT;
+    found.weights = weights;
 }
