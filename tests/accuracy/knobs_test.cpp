@@ -6,6 +6,7 @@
 #include "error.h"
 #include "lab_fixture.h"
 #include "leaks.h"
+#include "payloads.h"
 #include "rtc/abi.h"
 #include "scene_knobs.h"
 
@@ -151,6 +152,16 @@ TEST_F(LabTest, TInDoubleIsRoundedOnce) {
     EXPECT_GT(hits, 1000u);
     EXPECT_LT(off, hits / 100);
     EXPECT_GT(off_in_float, hits / 4);
+}
+
+TEST_F(LabTest, PackedPayloadsPaintNearlyTheSame) {
+    const std::vector<PayloadRow> rows = measure_payloads(test_context(), 64, 1);
+    ASSERT_EQ(rows.size(), 2u);
+    EXPECT_EQ(rows[0].colour_error_mean, 0);
+    EXPECT_LT(rows[1].bytes, rows[0].bytes);
+    EXPECT_GT(rows[1].colour_error_mean, 0) << "halves are rounded";
+    EXPECT_LT(rows[1].colour_error_mean, 0.01);
+    EXPECT_LE(rows[1].colour_error_max, 1);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 // rays, as one table and one plot.
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <ctime>
 #include <nlohmann/json.hpp>
@@ -13,6 +14,7 @@
 #include "error.h"
 #include "experiments.h"
 #include "native_tracer.h"
+#include "payloads.h"
 #include "report.h"
 
 namespace rtc::lab {
@@ -350,9 +352,27 @@ int measure_command(int argc, char** argv) {
                 good = false;
             }
     }
+    std::vector<PayloadRow> payloads;
+    const auto with_knob = std::find_if(tiers.begin(), tiers.end(), is_knob);
+    if (settings.cost_rays && with_knob != tiers.end() && subjects[size_t(with_knob - tiers.begin())]) {
+        try {
+            const uint32_t side = std::max(64u, uint32_t(std::sqrt(double(settings.cost_rays) / 2)) & ~7u);
+            payloads = measure_payloads(*subjects[size_t(with_knob - tiers.begin())]->context(), side, settings.repeats);
+        } catch (const Error& problem) {
+            std::fprintf(stderr, "rtc-accuracy: error: payloads: %s\n", problem.what());
+            good = false;
+        }
+    }
     auto results = [&] {
         Json json{{"device", device.empty() ? "the host" : device}, {"by_cpu", by_cpu}, {"command", command}};
         for (const Report& report : reports) json["tiers"].push_back(to_json(report));
+        for (const PayloadRow& p : payloads)
+            json["payload"].push_back({{"name", p.name},
+                                       {"bytes", p.bytes},
+                                       {"seconds", p.seconds},
+                                       {"against_first", p.against_first},
+                                       {"colour_error_mean", p.colour_error_mean},
+                                       {"colour_error_max", p.colour_error_max}});
         return json;
     };
     for (size_t i = 0; i < tiers.size(); ++i) {
