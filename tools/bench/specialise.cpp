@@ -1,7 +1,9 @@
 // rtc-bench specialise: what each promise about a scene gains, alone and together, against the same pipeline with
 // nothing removed. Launches are interleaved; a CPU's time is the process's, a GPU's its own clock.
 #include <algorithm>
+#include <cctype>
 #include <cstdio>
+#include <cstdlib>
 #include <ctime>
 #include <fstream>
 #include <memory>
@@ -13,6 +15,7 @@
 #include "commands.h"
 #include "error.h"
 #include "pipeline.h"
+#include "pipeline_statistics.h"
 #include "trace_runner.h"
 #include "vulkan_context.h"
 
@@ -47,7 +50,18 @@ struct Cell {
     double gain = 0;      // time with nothing removed over this time
     double compile_s = 0;
     uint32_t instructions = 0;
+    uint32_t registers = 0;  // of all passes, the most; 0: the driver does not tell
 };
+
+// The largest number behind a name with "register count" in it, in what TraceRunner::statistics says.
+uint32_t registers_in(std::string statistics) {
+    std::transform(statistics.begin(), statistics.end(), statistics.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+    const std::string name = "register count ";
+    uint32_t most = 0;
+    for (size_t at = statistics.find(name); at != std::string::npos; at = statistics.find(name, at + 1))
+        most = std::max(most, uint32_t(std::strtoul(statistics.c_str() + at + name.size(), nullptr, 10)));
+    return most;
+}
 
 struct Running {
     size_t column = 0;
@@ -63,13 +77,14 @@ class Bench {
         setenv("__GL_SHADER_DISK_CACHE", "0", 1);
         ContextOptions context_options;
         context_options.device = options.device;
+        tools::want_pipeline_statistics(context_options, statistics_);
         context_ = std::make_unique<Context>(context_options);
         device_ = std::make_unique<RtcDevice>(*context_);
         timer_ = std::make_unique<tools::GpuTimer>(*context_);
         cpu_ = context_->properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
         size_ = options.size ? options.size : cpu_ ? 128 : 2048;
         columns_.push_back({"nothing removed", {}, false});
-        columns_.push_back({"proven", {}, true});
+        columns_.push_back({"nothing more", {}, true});
         for (const Assumption& known : assumptions()) columns_.push_back({known.name, {known.name}, true});
         columns_.push_back({"all", {}, true});
     }
@@ -111,6 +126,7 @@ class Bench {
             const double first = cpu_seconds();
             launch(*running.runner, 1);
             cell.compile_s = std::max(0.0, (first - begin) - (cpu_seconds() - first));
+            cell.registers = registers_in(running.runner->statistics);
             cell.instructions = instructions(running.runner->job(), variant);
             return true;
         } catch (const Error& error) {
@@ -159,30 +175,40 @@ class Bench {
         std::ostringstream out;
         char text[64];
         out << "`" << options_.workload << "`, " << size_ << "×" << size_
-            << ": time with nothing removed over time with this switch alone (median of " << options_.repeats
+            << ": time with nothing removed over time with what is proven and this switch alone (median of " << options_.repeats
             << " interleaved " << (cpu_ ? "CPU-time" : "GPU-clock")
-            << " ratios; above 1 is faster; –: the scene is not so).\n\n| switch |";
+            << " ratios; above 1 is faster; –: the scene is not so).\n\n| proof and |";
         for (const auto& [name, cells] : rows_) out << " " << name << " |";
-        out << " instructions | driver's compile, s |\n| --- |";
-        for (size_t i = 0; i < rows_.size() + 2; ++i) out << " --- |";
+        bool told = false;
+        for (const auto& [name, cells] : rows_)
+            for (const Cell& cell : cells) told = told || cell.registers;
+        out << " instructions |" << (told ? " registers |" : "") << " driver's compile, s |\n| --- |";
+        for (size_t i = 0; i < rows_.size() + 2 + told; ++i) out << " --- |";
         out << "\n";
         for (size_t column = 0; column < columns_.size(); ++column) {
             out << "| " << columns_[column].name << " |";
-            uint32_t instructions = 0;
+            uint32_t instructions = 0, registers = 0;
             std::vector<double> compile;
             for (const auto& [name, cells] : rows_) {
                 const Cell& cell = cells[column];
                 if (cell.applies) {
                     std::snprintf(text, sizeof text, " %.3f |", cell.gain);
                     instructions = instructions ? std::min(instructions, cell.instructions) : cell.instructions;
+                    registers = std::max(registers, cell.registers);
                     compile.push_back(cell.compile_s);
                 } else {
                     std::snprintf(text, sizeof text, " – |");
                 }
                 out << text;
             }
-            std::snprintf(text, sizeof text, " %u | %.2f |\n", instructions, median_of(compile));
-            out << (instructions ? text : " – | – |\n");
+            if (!instructions) {
+                out << (told ? " – | – | – |\n" : " – | – |\n");
+                continue;
+            }
+            out << " " << instructions << " |";
+            if (told) out << " " << registers << " |";
+            std::snprintf(text, sizeof text, " %.2f |\n", median_of(compile));
+            out << text;
         }
         return out.str();
     }
@@ -223,6 +249,7 @@ class Bench {
                                              {"applies", cells[i].applies},
                                              {"gain", cells[i].gain},
                                              {"instructions", cells[i].instructions},
+                                             {"registers", cells[i].registers},
                                              {"driver_compile_s", cells[i].compile_s}});
             out["scenes"].push_back(std::move(scene));
         }
@@ -235,6 +262,7 @@ class Bench {
     std::unique_ptr<Context> context_;
     std::unique_ptr<RtcDevice> device_;
     std::unique_ptr<tools::GpuTimer> timer_;
+    VkPhysicalDevicePipelineExecutablePropertiesFeaturesKHR statistics_{};
     bool cpu_ = false;
     uint32_t size_ = 0;
     std::vector<Switches> columns_;

@@ -24,9 +24,8 @@ void want_pipeline_statistics(ContextOptions& options,
                               VkPhysicalDevicePipelineExecutablePropertiesFeaturesKHR& features) {
     features = {VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PIPELINE_EXECUTABLE_PROPERTIES_FEATURES_KHR};
     features.pipelineExecutableInfo = VK_TRUE;
-    features.pNext = options.features;
-    options.features = &features;
     options.optional_extensions.push_back(VK_KHR_PIPELINE_EXECUTABLE_PROPERTIES_EXTENSION_NAME);
+    options.optional_features.push_back({VK_KHR_PIPELINE_EXECUTABLE_PROPERTIES_EXTENSION_NAME, &features});
 }
 
 VkPipelineCreateFlags statistics_flag(const Context& context) {
