@@ -50,6 +50,11 @@ static uint32_t most_slots(const struct RtrAccelerationStructure_T* as) {
                       (as->type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV ? RTC_INSTANCE_QUADS : RTC_AABB_QUADS));
 }
 
+static uint32_t window_of(RtrDevice d, uint32_t bytes_each) {
+    /* Whole multiples of 16 entries keep the next window aligned to 256 bytes. */
+    return d->limits.maxStorageBufferRange / bytes_each / 16u * 16u;
+}
+
 void rtr_update_scratch(const struct RtrAccelerationStructure_T* as, RtrScratchLayout* l) {
     const uint32_t slots = most_slots(as), nodes = rtr_most_nodes(as);
     memset(l, 0, sizeof *l);
@@ -59,11 +64,12 @@ void rtr_update_scratch(const struct RtrAccelerationStructure_T* as, RtrScratchL
     place(l, RTR_ARR_LEAF_BOX, 32ull * slots);
     place(l, RTR_ARR_LINKS, 4ull * nodes);
     place(l, RTR_ARR_MARKS, 4ull * (slots > nodes ? slots : nodes));
-}
-
-static uint32_t window_of(RtrDevice d, uint32_t bytes_each) {
-    /* Whole multiples of 16 entries keep the next window aligned to 256 bytes. */
-    return d->limits.maxStorageBufferRange / bytes_each / 16u * 16u;
+    if (nodes <= window_of(as->device, RTC_NODE_QUADS * RTC_QUAD_BYTES)) {
+        share(l, RTR_ARR_PAIRS_A, RTR_ARR_LINKS, 4ull * nodes); /* not used, but bound */
+        return;
+    }
+    place(l, RTR_ARR_NODE_BOX, 32ull * nodes);
+    place(l, RTR_ARR_PAIRS_A, 8ull * nodes);
 }
 
 static VkResult check_build(RtrBuild* b, const VkAccelerationStructureInfoNV* info, VkBool32 update,
@@ -187,7 +193,6 @@ static VkResult prepare(RtrBuild* b, RtrRecorder recorder, const RtrAcceleration
         return rtr_error(b->device, VK_ERROR_FEATURE_NOT_PRESENT, "indirect-build",
                          "indirect update of %u geometries of a structure that the host knows nothing of",
                          info->geometryCount);
-    if (b->update) return rtr_check_update_reach(b);
     return VK_SUCCESS;
 }
 

@@ -111,6 +111,5 @@ uint32_t rtr_most_nodes(const struct RtrAccelerationStructure_T* as);
 /* Record the next part of a build or an update; may find that there is nothing to do in it. */
 VkResult rtr_record_build_phase(RtrBuild* b);
 VkResult rtr_record_update_phase(RtrBuild* b);
-VkResult rtr_check_update_reach(RtrBuild* b);
 
 #endif /* RTR_BUILD_H_ */

@@ -102,6 +102,8 @@ RtrGetBufferDeviceAddress rtr_load_buffer_device_address(const RtrInstanceTable*
     X(refit_triangles)  \
     X(refit_aabbs)      \
     X(refit_nodes)      \
+    X(refit_boxes)      \
+    X(refit_store)      \
     X(prepare_launch)   \
     X(finish_launch)    \
     X(validate_launch)  \

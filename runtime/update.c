@@ -58,16 +58,36 @@ static uint32_t nodes(const RtrBuild* b) {
     return most < room ? most : room;
 }
 
-VkResult rtr_check_update_reach(RtrBuild* b) {
-    if (nodes(b) <= b->node_window) return VK_SUCCESS;
-    return rtr_error(b->device, VK_ERROR_FEATURE_NOT_PRESENT, "maxStorageBufferRange",
-                     "update of %u primitives: maxStorageBufferRange %u reaches the nodes of %u", b->primitives,
-                     b->device->limits.maxStorageBufferRange, b->node_window);
+/* Whether they are seen through windows; rtr_update_scratch has arrays for that then. */
+static bool windowed(const RtrBuild* b) { return b->layout.size[RTR_ARR_NODE_BOX] != 0; }
+
+/* One window of the nodes: their links, or their boxes. *more: there is another. */
+static VkResult node_window(RtrBuild* b, RtrKernel kernel, bool* more) {
+    const uint32_t count = nodes(b) - b->window < b->node_window ? nodes(b) - b->window : b->node_window;
+    const uint32_t lanes = kernel == RTR_KERNEL_refit_links && !b->window && b->primitives > count ? b->primitives : count;
+    VkResult r = VK_SUCCESS;
+    b->push.window_first = b->window;
+    b->push.window_count = count;
+    if (b->window) r = rtr_bind_arrays(b, b->window, 0);
+    if (r != VK_SUCCESS) return r;
+    if (b->window)
+        rtr_dispatch(b, kernel, rtr_groups(lanes, RTR_GROUP));
+    else
+        r = rtr_dispatch_whole(b, kernel, rtr_groups(lanes, RTR_GROUP));
+    b->window += count;
+    *more = b->window < nodes(b);
+    if (!*more) b->window = 0;
+    return r;
 }
 
-enum { COPY, INIT, RANGES, COUNT, LINKS, CHECK, SLOTS, NODES };
+/* Nothing before the links needs the state words. */
+static bool links_begin(const RtrBuild* b) { return !b->indirect && !b->device->validation; }
+
+enum { COPY, INIT, RANGES, COUNT, LINKS, CHECK, SLOTS, NODES, STORE };
 
 VkResult rtr_record_update_phase(RtrBuild* b) {
+    bool more = false;
+    VkResult r;
     switch (b->phase) {
         case COPY:
             b->phase++;
@@ -77,6 +97,11 @@ VkResult rtr_record_update_phase(RtrBuild* b) {
                                                    VK_COPY_ACCELERATION_STRUCTURE_MODE_CLONE_NV);
         case INIT:
             b->phase++;
+            if (windowed(b)) b->push.flags |= RTR_REFIT_WINDOWS;
+            if (links_begin(b)) {
+                b->push.flags |= RTR_REFIT_INIT;
+                return VK_SUCCESS;
+            }
             return rtr_dispatch_whole(b, RTR_KERNEL_init, 1);
         case RANGES:
             b->phase++;
@@ -84,16 +109,23 @@ VkResult rtr_record_update_phase(RtrBuild* b) {
         case COUNT:
             return count_active(b);
         case LINKS:
-            b->phase++;
-            return rtr_dispatch_whole(b, RTR_KERNEL_refit_links,
-                                      rtr_groups(b->primitives > nodes(b) ? b->primitives : nodes(b), RTR_GROUP));
+            r = node_window(b, RTR_KERNEL_refit_links, &more);
+            if (!more) b->phase++;
+            return r;
         case CHECK:
             b->phase++;
             return b->push.flags & RTR_BUILD_TOP ? rtr_check_build_instances(b, RTR_ARR_LINKS) : VK_SUCCESS;
         case SLOTS:
             return slots(b);
+        case NODES:
+            b->phase++;
+            b->window = 0;
+            b->done = !windowed(b);
+            return rtr_dispatch_whole(b, windowed(b) ? RTR_KERNEL_refit_boxes : RTR_KERNEL_refit_nodes,
+                                      rtr_groups(nodes(b), RTR_GROUP));
         default:
-            b->done = true;
-            return rtr_dispatch_whole(b, RTR_KERNEL_refit_nodes, rtr_groups(nodes(b), RTR_GROUP));
+            r = node_window(b, RTR_KERNEL_refit_store, &more);
+            b->done = !more;
+            return r;
     }
 }

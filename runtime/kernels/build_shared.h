@@ -95,6 +95,8 @@
 #define RTR_BUILD_COUNTED 128u /* an update that counted the active primitives */
 #define RTR_FIT_LISTED 256u /* lbvh_fit starts at a list of nodes */
 #define RTR_FIT_KEPT 512u   /* a pass before has finished all nodes */
+#define RTR_REFIT_INIT 1024u     /* refit_links sets the state words */
+#define RTR_REFIT_WINDOWS 2048u  /* nodes are seen through several windows */
 #define RTR_BUILD_CHECKED 32u /* check_instances left in MARKS whether a reference is good */
 
 struct RtrBuildPush {

@@ -5,28 +5,21 @@
 // goes on to the parent; see lbvh_fit.comp.
 #define RTR_COHERENT coherent
 #include "common.glsl"
-#include "facts.glsl"
 #include "refit.glsl"
+#include "refit_tree.glsl"
 
 void leaf_child(uint node, uint side, uint ref) {
-    uint count = (ref >> RTC_REF_COUNT_SHIFT) & RTC_REF_COUNT_MASK;
-    uint first = ref & RTC_REF_INDEX_MASK;
-    vec3 lo = vec3(RTR_FLT_MAX), hi = vec3(-RTR_FLT_MAX);
-    for (uint s = 0u; s < count; s++) {
-        lo = min(lo, leaf_box[2u * (first + s)].xyz);
-        hi = max(hi, leaf_box[2u * (first + s) + 1u].xyz);
-    }
-    if (count != 0u) {
-        dst_nodes[4u * node + 2u * side].xyz = floatBitsToUint(lo);
-        dst_nodes[4u * node + 2u * side + 1u].xyz = floatBitsToUint(hi);
-    }
+    vec3 lo, hi;
+    if (!slots_box(ref, lo, hi)) return;
+    dst_nodes[4u * node + 2u * side].xyz = floatBitsToUint(lo);
+    dst_nodes[4u * node + 2u * side + 1u].xyz = floatBitsToUint(hi);
 }
 
 void main() {
     uint i = lane_index();
     uint node = 0xffffffffu;
     if (!fits()) {
-        if (i == 0u && dst_header[RTC_HDR_MAGIC] == RTC_AS_MAGIC) dst_header[RTC_HDR_BAD_UPDATE] = RTC_BAD_UPDATE_COUNTS;
+        if (i == 0u) refuse_update();
         return;
     }
     if (i < dst_header[RTC_HDR_NODE_COUNT]) {
@@ -58,21 +51,7 @@ void main() {
                 dst_nodes[4u * next + 2u * side].xyz = floatBitsToUint(lo);
                 dst_nodes[4u * next + 2u * side + 1u].xyz = floatBitsToUint(hi);
             } else {
-                for (uint k = 0u; k < 3u; k++) {
-                    dst_header[RTC_HDR_BOUNDS_MIN + k] = floatBitsToUint(lo[k]);
-                    dst_header[RTC_HDR_BOUNDS_MAX + k] = floatBitsToUint(hi[k]);
-                }
-                bool recounted = (p.flags & RTR_BUILD_COUNTED) != 0u && state[RTR_ST_ACTIVE] != dst_header[RTC_HDR_ACTIVE_COUNT];
-                dst_header[RTC_HDR_BAD_UPDATE] = state[RTR_ST_BAD_UPDATE] != 0xffffffffu ? state[RTR_ST_BAD_UPDATE] + 1u :
-                                                 recounted ? RTC_BAD_UPDATE_ACTIVE : 0u;
-                if ((p.flags & RTR_BUILD_TOP) != 0u) {
-                    uint n = dst_header[RTC_HDR_ACTIVE_COUNT];
-                    dst_header[RTC_HDR_FACTS] = top_facts(n);
-                    for (uint bit = 0u; bit < RTC_HDR_OFFENDERS_END - RTC_HDR_OFFENDERS; bit++)
-                        dst_header[RTC_HDR_OFFENDERS + bit] = offender(bit, n);
-                    dst_header[RTC_HDR_FIRST_OFFENDER] = state[RTR_ST_OFFENDER];
-                    dst_header[RTC_HDR_BAD_INSTANCE] = state[RTR_ST_BAD_INSTANCE] + 1u;
-                }
+                finish_header(lo, hi);
             }
         }
         node = next;

@@ -325,22 +325,6 @@ TEST_F(MisuseStructuresTest, SmallStorageBuffers) {
         g.geometry.aabbs.stride = 4000;
         return build(scene, g, scratch, ranges.handle);
     });
-    // An update needs all nodes in one binding; the build goes through windows.
-    with_limit(8192, "update of 250 primitives: maxStorageBufferRange 8192 reaches the nodes of 128",
-               [&](Scene& scene, VkBuffer scratch) {
-                   const VkGeometryNV g = scene.aabbs(std::vector<std::array<float, 6>>(250));
-                   VkAccelerationStructureInfoNV info{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV};
-                   info.type = VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_NV;
-                   info.flags = VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV;
-                   info.geometryCount = 1;
-                   info.pGeometries = &g;
-                   auto as = scene.create(info);
-                   EXPECT_EQ(rtrCmdBuildAccelerationStructure(scene.recorder, &info, VK_NULL_HANDLE, 0, VK_FALSE, as,
-                                                              nullptr, scratch, 0),
-                             VK_SUCCESS);
-                   return rtrCmdBuildAccelerationStructure(scene.recorder, &info, VK_NULL_HANDLE, 0, VK_TRUE, as,
-                                                           nullptr, scratch, 0);
-               });
     with_limit(4096, "reaches the handles of 256 instances", [&](Scene& scene, VkBuffer) {
         VkAccelerationStructureInfoNV info{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV};
         info.type = VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV;
