@@ -101,6 +101,7 @@ void measure_axis(RayTracer& tracer, const std::string& axis, uint64_t rays, std
         for (Aim aim : {Aim::Interior, Aim::Edge, Aim::Vertex}) {
             point.c.aim = aim;
             point.c.seed = ++seed;
+            point.c.look = point.promised && aim != Aim::Interior;  // of the others nobody is told
             LeakRow row{axis, point.value, point.mesh.name, aim_name(aim), point.promised, {}};
             // Half from inside where inside is known.
             // At offsets of 1e7 and more nothing lies inside a sphere of a few ulps.

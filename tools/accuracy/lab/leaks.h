@@ -22,6 +22,7 @@ struct LeakCase {
     double distance = 3;       // of outside origins, in sizes
     bool from_zero = false;    // outside origins lie within one unit of (0, 0, 0) instead
     int axis_parallel = -1;    // >= 0: rays run along this axis exactly
+    bool look = true;          // at unbalanced rays, in exact arithmetic
     uint64_t seed = 1;
 };
 
