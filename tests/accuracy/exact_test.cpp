@@ -117,6 +117,7 @@ uint32_t turns_reserved() {
 TEST(ExactTurns, LongestDecisionFitsWhatIsReserved) {
     const uint32_t reserved = turns_reserved();
     ASSERT_GT(reserved, 0u) << "the constant has another name";
+    EXPECT_LE(reserved + 1024, 6600u) << "what docs/resumable.md says of budgets";
     TracerOptions options;
     options.variant = Variant::Exact;
     options.aabbs = options.any_hit = options.resumable = false;

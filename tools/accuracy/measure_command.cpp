@@ -106,6 +106,23 @@ SelfHits measure_self_hits(const tools::Context& context, const std::string& sub
     return sum;
 }
 
+// A line a member, and a line a tier: small, and fit for version control.
+std::string lines_of(const Json& json) {
+    std::string text = "{\n";
+    for (auto member = json.begin(); member != json.end(); ++member) {
+        text += " " + Json(member.key()).dump() + ": ";
+        if (member.key() == "tiers") {
+            text += "[\n";
+            for (const Json& tier : member.value()) text += tier.dump() + (&tier == &member.value().back() ? "\n" : ",\n");
+            text += " ]";
+        } else {
+            text += member.value().dump();
+        }
+        text += std::next(member) == json.end() ? "\n" : ",\n";
+    }
+    return text + "}\n";
+}
+
 Json to_json(const Report& report) {
     Json json{{"tier", report.subject}};
     if (!report.problem.empty()) json["problem"] = report.problem;
@@ -131,7 +148,6 @@ Json to_json(const Report& report) {
                                  {"of_these_leaks", r.counts.leaks},
                                  {"of_these_doubles", r.counts.doubles},
                                  {"seconds", r.counts.seconds},
-                                 {"bound_95", upper_bound(r.counts.unbalanced, r.counts.rays)},
                                  {"promised_zero", r.must_be_zero}});
     for (const CullRow& r : report.culls)
         json["culls"].push_back({{"mesh", r.mesh}, {"place", r.place}, {"rays", r.rays}, {"culled", r.culls}});
@@ -380,7 +396,7 @@ int measure_command(int argc, char** argv) {
         const double left = std::max(1.0, settings.seconds - seconds_since(start)) / double(tiers.size() - i);
         attempt(i, [&] { measure(*subjects[i], reports[i], settings, settings.seconds > 0 ? left : 0); });
         good = verdict(reports[i]) && good;
-        if (!json_path.empty()) write_file(json_path, results().dump(1) + "\n");  // long runs get interrupted
+        if (!json_path.empty()) write_file(json_path, lines_of(results()));  // long runs get interrupted
     }
     const Json json = results();
     const DeviceReport summary = summarise({json}).at(0);
@@ -388,7 +404,7 @@ int measure_command(int argc, char** argv) {
     std::fputs(table.c_str(), stdout);
     if (!markdown_path.empty()) write_file(markdown_path, table);
     if (!plot_path.empty()) write_file(plot_path, plot_svg(summary));
-    if (!json_path.empty()) write_file(json_path, json.dump(1) + "\n");
+    if (!json_path.empty()) write_file(json_path, lines_of(json));
     for (const auto& subject : subjects)
         if (subject && subject->context() && subject->context()->validating()) subject->context()->require_silent_validation();
     return good ? 0 : 1;
