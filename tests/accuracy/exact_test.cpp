@@ -147,5 +147,74 @@ TEST(ExactTurns, LongestDecisionFitsWhatIsReserved) {
     EXPECT_GT(most, 1500u) << "no long decision was met: this test sees nothing";
 }
 
+// Lavapipe 22.3 ends all loops of eight lanes once they have spent 65535 turns together, and lanes that decide different
+// things take their turns one after another: the budget that the runtime recommends must hold eight longest decisions.
+TEST(ExactTurns, LanesThatDecideDifferentThingsEndInTime) {
+    TracerOptions options;
+    options.variant = Variant::Exact;
+    options.aabbs = options.any_hit = false;
+    options.step_budget = 65535 / 8 / 8 * 7;
+    options.pause = true;
+    DeviceTracer tracer(test_context(), options);
+    Random random(11);
+    std::vector<Triangle> triangles(64);
+    std::vector<Ray> rays;
+    for (Triangle& triangle : triangles) {
+        for (Vec3& v : triangle)
+            for (float* x : {&v.x, &v.y, &v.z})
+                *x = std::ldexp(1 + float(random() % 8388608) / 8388608, int(random() % 240) - 120) * (random() & 1 ? 1.0f : -1.0f);
+        for (const Vec3& v : triangle)
+            for (const float scale : {1.0f, 0.5f, 3.0f}) {
+                Ray ray = make_ray({0, 0, 0}, {v.x * scale, v.y * scale, v.z * scale});
+                ray.tmin = 0.5f / scale;
+                ray.tmax = 2 / scale;
+                rays.push_back(ray);
+            }
+    }
+    const HostScene scene = build_scene({Blas{{{triangles, {}, true}}}}, {{}});
+    tracer.set_scene(scene);
+    const auto got = tracer.trace(rays);
+    const auto expected = first_hits(Oracle(scene), rays);
+    uint32_t long_ones = 0, hits = 0;
+    for (size_t i = 0; i < rays.size(); ++i) {
+        long_ones += got[i].turns > 1000;
+        hits += expected[i].has_value();
+        ASSERT_EQ(got[i].instance != kNoInstance, expected[i].has_value()) << i;
+        if (expected[i]) {
+            ASSERT_EQ(got[i].primitive, expected[i]->primitive) << i;
+        }
+    }
+    EXPECT_GT(long_ones, rays.size() / 8) << "no long decisions side by side";
+    EXPECT_GT(hits, 64u);
+}
+
+// Pairs and integers do without Float64.
+TEST(Exact, NeedsNoFloat64) {
+    tools::ContextOptions plain;
+    plain.validate = true;
+    plain.print_device = false;
+    const tools::Context context(plain);
+    ASSERT_FALSE(context.features.shaderFloat64);
+    TracerOptions options;
+    options.variant = Variant::Exact;
+    options.aabbs = options.any_hit = false;
+    options.step_budget = 7000;
+    options.pause = true;
+    DeviceTracer tracer(context, options);
+    const ExactCase c = exact_cases("aim").at(0);
+    const HostScene scene = build_scene(c.blases, c.instances, c.build);
+    tracer.set_scene(scene);
+    const std::vector<Ray> rays = c.rays(0, 512);
+    const auto got = tracer.trace(rays);
+    const auto expected = first_hits(Oracle(scene), rays);
+    for (size_t i = 0; i < rays.size(); ++i) {
+        ASSERT_EQ(got[i].instance != kNoInstance, expected[i].has_value()) << i;
+        if (expected[i]) {
+            ASSERT_EQ(got[i].primitive, expected[i]->primitive) << i;
+        }
+    }
+    context.require_silent_validation();
+}
+
 }  // namespace
 }  // namespace rtc::lab
