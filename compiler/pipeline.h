@@ -90,6 +90,8 @@ struct LinkOptions {
     uint32_t reserved_binding = 0;
     bool specialize = true;             // remove what the pipeline and `assumptions` show not to be needed
     uint32_t assumptions = 0;           // what scenes are promised to be: bits of Assumption
+    std::vector<std::string> ignored_facts;  // for measurements: names of FactReport that count as unknown
+    bool ignores(std::string_view fact) const;
     std::string stop_after;             // for tests: name of the pass after which to print and stop
 };
 

@@ -75,4 +75,12 @@ rtcc_status rtcc_options_set_specialize(rtcc_options_t options, int enable) {
     });
 }
 
+rtcc_status rtcc_options_ignore_fact(rtcc_options_t options, const char* name) {
+    return guarded(options, [&] {
+        if (!name || !*name) return false;
+        options->link.ignored_facts.push_back(name);
+        return true;
+    });
+}
+
 }  // extern "C"

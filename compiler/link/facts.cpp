@@ -1,4 +1,5 @@
 // What a pipeline's code proves, and what its user promises, about rays and scenes.
+#include <algorithm>
 #include <array>
 #include <cstdio>
 
@@ -21,6 +22,10 @@ constexpr std::array<Assumption, 7> kAssumptions = {{
 }};
 
 }  // namespace
+
+bool LinkOptions::ignores(std::string_view fact) const {
+    return std::find(ignored_facts.begin(), ignored_facts.end(), fact) != ignored_facts.end();
+}
 
 std::span<const Assumption> assumptions() { return kAssumptions; }
 
@@ -55,6 +60,8 @@ constexpr Flag kFlags[] = {
     {512, "SkipAABBs"},
 };
 constexpr uint32_t kAllFlags = 1023;
+
+constexpr const char* kIgnored = "known, but left out on request";
 
 std::string flag_names(uint32_t bits) {
     std::string out;
@@ -91,13 +98,16 @@ void collect_trace_facts(const Program& program, const lower::Stage& stage, Trac
 
 Needs scene_needs(const LinkOptions& options) {
     Needs needs;
-    auto not_assumed = [&](uint32_t bits) { return !options.specialize || !(options.assumptions & bits); };
-    needs.mixed = not_assumed(RTC_FACT_HAS_TRIANGLES | RTC_FACT_HAS_AABBS);
-    needs.non_opaque = not_assumed(RTC_FACT_ALL_OPAQUE);
-    needs.masks = not_assumed(RTC_FACT_FULL_MASKS);
-    needs.instance_flags = not_assumed(RTC_FACT_NO_INSTANCE_FLAGS);
-    needs.transforms = not_assumed(RTC_FACT_IDENTITY_TRANSFORMS);
-    needs.levels = not_assumed(RTC_FACT_SINGLE_LEVEL);
+    auto open = [&](const char* fact, uint32_t bits) {
+        return !options.specialize || !(options.assumptions & bits) || options.ignores(fact);
+    };
+    needs.mixed = open("no procedural geometry", RTC_FACT_HAS_AABBS) &&
+                  open("only procedural geometry", RTC_FACT_HAS_TRIANGLES);
+    needs.non_opaque = open("opaque", RTC_FACT_ALL_OPAQUE);
+    needs.masks = open("no-masks", RTC_FACT_FULL_MASKS);
+    needs.instance_flags = open("no-instance-flags", RTC_FACT_NO_INSTANCE_FLAGS);
+    needs.transforms = open("identity-transforms", RTC_FACT_IDENTITY_TRANSFORMS);
+    needs.levels = open("single-level", RTC_FACT_SINGLE_LEVEL);
     return needs;
 }
 
@@ -128,7 +138,10 @@ Needs decide(const TraceFacts& traces, const PipelineShape& shape, const LinkOpt
     needs.any_hit = false;
     if (!shape.has_any_hit)
         report("no any-hit", "proven", "the pipeline has no any-hit shader: every candidate triangle is a hit");
-    else if (flags.ones & 1)
+    else if (options.ignores("no any-hit")) {
+        needs.any_hit = true;
+        report("no any-hit", "unknown", kIgnored);
+    } else if (flags.ones & 1)
         report("no any-hit", "proven", "every trace has the ray flag Opaque: any-hit shaders are not linked");
     else if (flags.ones & 128)
         report("no any-hit", "proven", "every trace has the ray flag CullNoOpaque: any-hit shaders are not linked");
@@ -142,8 +155,14 @@ Needs decide(const TraceFacts& traces, const PipelineShape& shape, const LinkOpt
 
     needs.aabbs = false;
     if (!shape.has_intersection)
-        report("no procedural geometry", "proven", "the pipeline has no intersection shader: AABBs are never hit");
-    else if (flags.ones & 512)
+        report("no procedural geometry", "proven",
+               assumed(RTC_FACT_HAS_AABBS)
+                   ? "the pipeline has no intersection shader, and 'triangles': whether instances hold AABBs is not asked"
+                   : "the pipeline has no intersection shader: AABBs are never hit");
+    else if (options.ignores("no procedural geometry")) {
+        needs.aabbs = true;
+        report("no procedural geometry", "unknown", kIgnored);
+    } else if (flags.ones & 512)
         report("no procedural geometry", "proven", "every trace has the ray flag SkipAABBs: intersection shaders are not linked");
     else if (assumed(RTC_FACT_HAS_AABBS))
         report("no procedural geometry", "assumed", "'triangles': intersection shaders are not linked");
@@ -153,7 +172,10 @@ Needs decide(const TraceFacts& traces, const PipelineShape& shape, const LinkOpt
     }
 
     needs.triangles = false;
-    if (flags.ones & 256)
+    if (options.ignores("only procedural geometry")) {
+        needs.triangles = true;
+        report("only procedural geometry", "unknown", kIgnored);
+    } else if (flags.ones & 256)
         report("only procedural geometry", "proven", "every trace has the ray flag SkipTriangles: no triangle test");
     else if (assumed(RTC_FACT_HAS_TRIANGLES))
         report("only procedural geometry", "assumed", "'aabbs': no triangle test");
@@ -164,7 +186,9 @@ Needs decide(const TraceFacts& traces, const PipelineShape& shape, const LinkOpt
 
     // ---- operands of traces ----
     const uint32_t known = (flags.zeros | flags.ones) & kAllFlags;
-    if (known == kAllFlags)
+    if (options.ignores("ray flags"))
+        report("ray flags", "unknown", kIgnored);
+    else if (known == kAllFlags)
         report("ray flags", "proven", "constant at every trace: " + flag_names(flags.ones & kAllFlags));
     else if (known)
         report("ray flags", "proven", "in part: never " + flag_names(flags.zeros & kAllFlags) + "; always " +
@@ -174,7 +198,7 @@ Needs decide(const TraceFacts& traces, const PipelineShape& shape, const LinkOpt
     auto operand = [&](const char* name, Bits bits) {
         char text[64];
         std::snprintf(text, sizeof text, "constant at every trace: %u", bits.ones);
-        const bool constant = bits.constant(0xffffffffu);
+        const bool constant = bits.constant(0xffffffffu) && !options.ignores(name);
         report(name, constant ? "proven" : "unknown", constant ? text : "differs between traces, or known only when tracing");
     };
     operand("cull mask", traces.mask);

@@ -268,11 +268,14 @@ class Linker {
     void specialize_code() {
         std::map<Id, link::Bits> given;
         if (trace_facts_.sites) {
-            given[machine_.variable("rtc_ray_flags")] = trace_facts_.flags;
-            given[machine_.variable("rtc_ray_mask")] = trace_facts_.mask;
-            given[machine_.variable("rtc_ray_sbt_offset")] = trace_facts_.offset;
-            given[machine_.variable("rtc_ray_sbt_stride")] = trace_facts_.stride;
-            given[machine_.variable("rtc_ray_miss")] = trace_facts_.miss;
+            const auto give = [&](const char* fact, const char* variable, const link::Bits& bits) {
+                if (!options_.ignores(fact)) given[machine_.variable(variable)] = bits;
+            };
+            give("ray flags", "rtc_ray_flags", trace_facts_.flags);
+            give("cull mask", "rtc_ray_mask", trace_facts_.mask);
+            give("SBT record offset", "rtc_ray_sbt_offset", trace_facts_.offset);
+            give("SBT record stride", "rtc_ray_sbt_stride", trace_facts_.stride);
+            give("miss index", "rtc_ray_miss", trace_facts_.miss);
         }
         const std::vector<ir::Function*> left = link::fold(program_, main_, given, bit_tables_);
         link::remove_dead(program_, left, machine_.function("rtc_trace_save"), machine_.function("rtc_scratch_store"));

@@ -245,6 +245,12 @@ RTCC_EXPORT const char* rtcc_assumption_name(size_t index);
 /* Remove what the pipeline's code and the assumptions show not to be needed. Default 1; 0 is
  * for comparison, and ignores assumptions. */
 RTCC_EXPORT rtcc_status rtcc_options_set_specialize(rtcc_options_t options, int enable);
+/* For measuring what one fact is worth: the fact of this name (rtcc_fact_info::name: "ray flags",
+ * "cull mask", "opaque", ...) counts as unknown, and the code that it would remove stays. Facts
+ * that follow from the pipeline's shape ("recursion depth", "no shader records", "built-ins read",
+ * and "no any-hit" or "no procedural geometry" where there is no such shader) cannot be left
+ * out. Scenes are checked for all assumptions as before. RTCC_STATUS_INVALID_ARGUMENT for an empty name. */
+RTCC_EXPORT rtcc_status rtcc_options_ignore_fact(rtcc_options_t options, const char* name);
 RTCC_EXPORT rtcc_status rtcc_options_set_warnings_as_errors(rtcc_options_t options, int enable);
 RTCC_EXPORT rtcc_status rtcc_options_set_suppress_warnings(rtcc_options_t options, int enable);
 /* For rtc's own tests: print the module after the pass of that name (rtcc_result_text) and stop. */

@@ -16,8 +16,8 @@ GL_EXT_ray_tracing) or SPIR-V, told apart by SPIR-V's magic number.
 Options:
   --accuracy=<tier> Speed for accuracy: fast (leaks at edges), watertight (the
                     default: no cracks), exact (the triangle that exact
-                    arithmetic hits), exact64 (the same with Float64: faster
-                    where the device has it).
+                    arithmetic hits), exact64 (the same with Float64; no
+                    faster on any device measured, NVIDIA refuses it).
   --addressing=<mode>
                     How acceleration structures are reached: heap (default;
                     plain Vulkan 1.1) or address (needs bufferDeviceAddress).

@@ -204,13 +204,25 @@ class Program {
                              "rtrWriteSceneProfile wrote");
     }
 
-    // The same pipeline with nothing removed, for the report.
+    // The same pipeline with nothing removed, and with one fact after the other unknown, for the report.
     void report_unspecialized(rtcc_const_pipeline_t pipeline, const rtcc_reflection& now) const {
         const Options plain(rtcc_options_clone(options_.get()));
         rtcc_options_set_specialize(plain.get(), 0);
         const Result result(rtcc_compile_pipeline(compiler_.get(), pipeline, plain.get()));
         if (const rtcc_reflection* before = rtcc_result_reflection(result.get()))
             print(comparison_text(*before, now));
+        std::vector<std::pair<std::string, uint32_t>> without;
+        for (size_t i = 0; i < now.fact_count; ++i) {
+            if (now.facts[i].state == std::string("unknown")) continue;
+            const Options open(rtcc_options_clone(options_.get()));
+            rtcc_options_ignore_fact(open.get(), now.facts[i].name);
+            const Result other(rtcc_compile_pipeline(compiler_.get(), pipeline, open.get()));
+            const rtcc_reflection* r = rtcc_result_reflection(other.get());
+            // Facts of the pipeline's shape stay what they are.
+            if (r && r->fact_count == now.fact_count && r->facts[i].state != std::string(now.facts[i].state))
+                without.emplace_back(now.facts[i].name, r->instruction_count);
+        }
+        print(facts_text(without, now));
     }
 
     bool link(const Plan& plan) {

@@ -95,4 +95,14 @@ std::string comparison_text(const rtcc_reflection& before, const rtcc_reflection
            line("scratch bytes a lane", before.scratch_words * 4, now.scratch_words * 4);
 }
 
+std::string facts_text(const std::vector<std::pair<std::string, uint32_t>>& without, const rtcc_reflection& now) {
+    if (without.empty()) return "";
+    size_t width = 0;
+    for (const auto& [fact, instructions] : without) width = widest(width, fact.c_str());
+    std::string out = "instructions removed by one fact alone, the others known:\n";
+    for (const auto& [fact, instructions] : without)
+        out += "  " + padded(fact, width) + "  " + std::to_string(int64_t(instructions) - now.instruction_count) + "\n";
+    return out + "Registers and compile times are a driver's: rtc-bench specialise measures them.\n";
+}
+
 }  // namespace cli

@@ -95,6 +95,20 @@ TEST_F(Report, ReportOfAFinishedModule) {
     EXPECT_EQ(rtc("p.spv --report").out, linked.substr(0, linked.find("removed by what is known")));
 }
 
+// Each fact's own part, with the others known; what follows from the pipeline's shape has none.
+TEST_F(Report, ReportTellsWhatOneFactRemoves) {
+    const CliRun run = rtc("camera.rgen sky.rmiss shade.rchit --assume=single-level --report -o p.spv");
+    EXPECT_EQ(run.status, 0) << run.err;
+    const size_t at = run.out.find("instructions removed by one fact alone, the others known:\n");
+    ASSERT_NE(at, std::string::npos) << run.out;
+    const std::string facts = run.out.substr(at);
+    EXPECT_THAT(facts, ::testing::ContainsRegex("\n  cull mask +[1-9][0-9]*\n"));
+    EXPECT_THAT(facts, ::testing::ContainsRegex("\n  single-level +[1-9][0-9]*\n"));
+    EXPECT_THAT(facts, Not(HasSubstr("recursion depth")));
+    EXPECT_THAT(facts, Not(HasSubstr("identity-transforms")));
+    EXPECT_THAT(rtc("camera.rgen sky.rmiss --no-specialize --report -o p.spv").out, Not(HasSubstr("one fact alone")));
+}
+
 TEST_F(Report, ReportLeavesStandardOutputToTheModule) {
     const CliRun run = rtc("camera.rgen sky.rmiss --report -o -");
     EXPECT_TRUE(is_module(run.out));
