@@ -75,18 +75,21 @@ const Case kCases[] = {
      "instance 1 is made of triangles"},
 };
 
-class EachAssumption : public AssumeTest, public testing::WithParamInterface<Case> {
+// Of each case, in heap and in address mode.
+class EachAssumption : public AssumeTest, public testing::WithParamInterface<std::tuple<Case, bool>> {
   protected:
+    EachAssumption() { addresses = std::get<1>(GetParam()); }
+    const Case& kase() const { return std::get<0>(GetParam()); }
     std::vector<Instance> instances(bool good) {
-        return GetParam().instances(*scene, opaque, see_through, boxes, good);
+        return kase().instances(*scene, opaque, see_through, boxes, good);
     }
     void expect_refused(const Outcome& out) {
         EXPECT_EQ(out.value, kUntouched);
         EXPECT_EQ(out.error.code, RTC_LAUNCH_ERROR_ASSUMPTION);
-        EXPECT_EQ(out.error.detail[0], GetParam().fact);
+        EXPECT_EQ(out.error.detail[0], kase().fact);
         EXPECT_EQ(out.error.count, kLanes);
-        EXPECT_THAT(out.text, AllOf(HasSubstr("'" + GetParam().assume + "'"), HasSubstr(GetParam().names),
-                                    HasSubstr("--assume=" + GetParam().assume)));
+        EXPECT_THAT(out.text, AllOf(HasSubstr("'" + kase().assume + "'"), HasSubstr(kase().names),
+                                    HasSubstr("--assume=" + kase().assume)));
     }
     void expect_hit(const Outcome& out) {
         EXPECT_EQ(out.value, kHit);
@@ -95,12 +98,12 @@ class EachAssumption : public AssumeTest, public testing::WithParamInterface<Cas
 };
 
 TEST_P(EachAssumption, BuiltOtherwiseIsRefused) {
-    use(GetParam().assume, GetParam().group);
+    use(kase().assume, kase().group);
     expect_refused(trace(top(instances(false))));
 }
 
 TEST_P(EachAssumption, BoundInPlaceOfAnotherIsRefused) {
-    use(GetParam().assume, GetParam().group);
+    use(kase().assume, kase().group);
     const auto good = top(instances(true)), bad = top(instances(false));
     expect_hit(trace(good));
     expect_refused(trace(bad));
@@ -108,12 +111,12 @@ TEST_P(EachAssumption, BoundInPlaceOfAnotherIsRefused) {
 }
 
 TEST_P(EachAssumption, UpdatedUntilItBreaksIsRefused) {
-    use(GetParam().assume, GetParam().group);
+    use(kase().assume, kase().group);
     const auto changing = top(instances(true));
     expect_hit(trace(changing));
     update(changing, instances(false));
     // An instance that was not there when the tree was built is not in it after an update either.
-    if (!GetParam().by_update) return expect_hit(trace(changing));
+    if (!kase().by_update) return expect_hit(trace(changing));
     expect_refused(trace(changing));
     update(changing, instances(true));
     expect_hit(trace(changing));
@@ -121,15 +124,44 @@ TEST_P(EachAssumption, UpdatedUntilItBreaksIsRefused) {
 
 // Without the assumption the same scenes are traced: nothing above was refused for another reason.
 TEST_P(EachAssumption, WithoutItTheSceneIsTraced) {
-    use("", GetParam().group);
+    use("", kase().group);
     const Outcome out = trace(top(instances(false)));
     EXPECT_NE(out.value, kUntouched);
     EXPECT_EQ(out.error.code, RTC_LAUNCH_ERROR_NONE) << out.text;
 }
 
-INSTANTIATE_TEST_SUITE_P(All, EachAssumption, testing::ValuesIn(kCases),
-                         [](const testing::TestParamInfo<Case>& info) {
-                             std::string name = info.param.assume + std::to_string(info.index);
+// Copies and blobs take along what they break.
+TEST_P(EachAssumption, CopiedAndReadBackIsRefused) {
+    use(kase().assume, kase().group);
+    const auto bad = top(instances(false));
+    VkAccelerationStructureInfoNV info{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV};
+    info.type = VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV;
+    info.flags = VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV;
+    info.instanceCount = 2;
+    const auto clone = scene->create(info), back = scene->create(info);
+    Buffer size = scene->upload(nullptr, 16), blob = scene->upload(nullptr, 1 << 16);
+    scene->run([&] {
+        EXPECT_EQ(rtrCmdCopyAccelerationStructure(scene->recorder, clone, bad,
+                                                  VK_COPY_ACCELERATION_STRUCTURE_MODE_CLONE_NV), VK_SUCCESS);
+        EXPECT_EQ(rtrCmdWriteAccelerationStructuresProperties(scene->recorder, 1, &bad,
+                      VK_QUERY_TYPE_ACCELERATION_STRUCTURE_SERIALIZATION_SIZE_KHR, size.handle, 0), VK_SUCCESS);
+    });
+    const VkDeviceSize bytes = *size.as<uint64_t>();
+    ASSERT_LE(bytes, blob.size);
+    scene->run([&] {
+        EXPECT_EQ(rtrCmdCopyAccelerationStructureToMemory(scene->recorder, bad, blob.handle, 0, bytes), VK_SUCCESS);
+    });
+    scene->run([&] {
+        EXPECT_EQ(rtrCmdCopyMemoryToAccelerationStructure(scene->recorder, back, blob.handle, 0, bytes), VK_SUCCESS);
+    });
+    expect_refused(trace(clone));
+    expect_refused(trace(back));
+}
+
+INSTANTIATE_TEST_SUITE_P(All, EachAssumption, testing::Combine(testing::ValuesIn(kCases), testing::Bool()),
+                         [](const testing::TestParamInfo<std::tuple<Case, bool>>& info) {
+                             std::string name = std::get<0>(info.param).assume + std::to_string(info.index / 2) +
+                                                (std::get<1>(info.param) ? "_address" : "");
                              std::replace(name.begin(), name.end(), '-', '_');
                              return name;
                          });
@@ -159,6 +191,26 @@ TEST_F(AssumeTest, RayFlagsOutrankOpaqueGeometry) {
     EXPECT_EQ(trace(top({scene->instance(opaque)})).value, kMiss);
     use("", 2, "(gl_LaunchIDNV.x < 1000u ? gl_RayFlagsNoOpaqueNV : 0u)");
     EXPECT_EQ(trace(top({scene->instance(opaque)})).value, kMiss);
+}
+
+// A bottom level that the host built says what it holds, too.
+TEST_F(AssumeTest, HostBuiltBottomLevelsAreRefused) {
+    use("opaque");
+    const std::vector<Vec3> corners = {{-1, -1, 0}, {1, -1, 0}, {0, 2, 0}};
+    const VkGeometryNV geometry = scene->triangles(corners);
+    VkAccelerationStructureInfoNV info{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV};
+    info.type = VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_NV;
+    info.geometryCount = 1;
+    info.pGeometries = &geometry;
+    const auto built = scene->create(info);
+    RtrHostGeometry data{};
+    data.pVertexData = corners.data();
+    ASSERT_EQ(rtrBuildAccelerationStructureOnHost(rtr, &info, &data, built, const_cast<uint32_t*>(scene->words(built)),
+                                                  nullptr), VK_SUCCESS);
+    const Outcome out = trace(top({scene->instance(opaque), scene->instance(built)}));
+    EXPECT_EQ(out.value, kUntouched);
+    EXPECT_EQ(out.error.code, RTC_LAUNCH_ERROR_ASSUMPTION);
+    EXPECT_THAT(out.text, HasSubstr("geometry 0 of the bottom level of instance 1 is not opaque"));
 }
 
 TEST_F(AssumeTest, NothingIsRefusedInANullStructure) {

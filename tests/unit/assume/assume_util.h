@@ -43,12 +43,13 @@ struct Module {
     std::string json;
 };
 
-inline Module compile(const std::string& assume, const std::string& flags = "0u") {
+inline Module compile(const std::string& assume, const std::string& flags = "0u", bool addresses = false) {
     std::unique_ptr<rtcc_compiler, void (*)(rtcc_compiler_t)> compiler(rtcc_compiler_create(), rtcc_compiler_release);
     std::unique_ptr<rtcc_options, void (*)(rtcc_options_t)> options(rtcc_options_create(), rtcc_options_release);
     std::unique_ptr<rtcc_pipeline, void (*)(rtcc_pipeline_t)> pipeline(rtcc_pipeline_create(), rtcc_pipeline_release);
     EXPECT_EQ(rtcc_options_assume(options.get(), assume.c_str()), RTCC_STATUS_SUCCESS) << assume;
     rtcc_options_add_macro(options.get(), "FLAGS", flags.c_str());
+    rtcc_options_set_addressing(options.get(), addresses ? RTCC_ADDRESSING_ADDRESS : RTCC_ADDRESSING_HEAP);
     auto add = [&](rtcc_stage stage, const char* name, const char* text) {
         return rtcc_pipeline_add_glsl(pipeline.get(), stage, name, name, text, strlen(text));
     };
@@ -72,11 +73,13 @@ inline Module compile(const std::string& assume, const std::string& flags = "0u"
 class AssumeTest : public RuntimeTest {
   protected:
     static constexpr uint32_t kLanes = 40;
+    bool addresses = false;  // the addressing mode, to be set before SetUp
 
     void SetUp() override {
         RuntimeTest::SetUp();
         if (!vk || IsSkipped()) return;
-        scene = std::make_unique<Scene>(*vk, rtr, 4 << 20);
+        if (addresses && !vk->GetBufferDeviceAddress) GTEST_SKIP() << "the device has no bufferDeviceAddress";
+        scene = std::make_unique<Scene>(*vk, rtr, 4 << 20, addresses);
         const std::vector<Vec3> corners = {{-1, -1, 0}, {1, -1, 0}, {0, 2, 0}};
         opaque = scene->build_bottom({scene->triangles(corners, nullptr, VK_GEOMETRY_OPAQUE_BIT_NV)});
         VkGeometryNV solid = scene->triangles({{8, 8, 8}, {9, 8, 8}, {8, 9, 8}}, nullptr, VK_GEOMETRY_OPAQUE_BIT_NV);
@@ -124,7 +127,7 @@ class AssumeTest : public RuntimeTest {
     // `group`: 2 for triangles, 3 for boxes.
     void use(const std::string& assume, uint32_t group = 2, const std::string& flags = "0u") {
         drop_pipeline();
-        const Module module = compile(assume, flags);
+        const Module module = compile(assume, flags, addresses);
         RtrRayTracingPipelineCreateInfo info{};
         info.pCode = module.words.data();
         info.codeSize = module.words.size() * 4;
@@ -164,7 +167,7 @@ class AssumeTest : public RuntimeTest {
         EXPECT_EQ(rtrBeginRecorder(scene->recorder, vk->cmd), VK_SUCCESS);
         rtrCmdBindPipeline(scene->recorder, pipeline);
         rtrCmdBindDescriptorSets(scene->recorder, 0, 1, &set, 0, nullptr);
-        rtrCmdSetHeap(scene->recorder, scene->heap);
+        if (scene->heap) rtrCmdSetHeap(scene->recorder, scene->heap);
         rtrCmdSetLaunchScratch(scene->recorder, launch_scratch.handle, 0, launch_scratch.size);
         if (!declared.empty()) {
             EXPECT_EQ(rtrCmdDeclareScene(scene->recorder, static_cast<uint32_t>(declared.size()), declared.data()),
