@@ -269,7 +269,7 @@ VkResult rtrBindAccelerationStructureMemory(RtrDevice d, uint32_t count,
         as->heap = b->heap;
         as->buffer = b->heap->buffer;
         as->offset = b->heap->offset + b->heapOffset;
-        as->base = b->heapOffset / RTC_QUAD_BYTES;
+        as->base = (uint64_t)b->heap->id << 32 | b->heapOffset / RTC_QUAD_BYTES;
         rtr_add_live(as);
     }
     return VK_SUCCESS;

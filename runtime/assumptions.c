@@ -62,7 +62,7 @@ uint32_t rtr_first_not_opaque(const VkAccelerationStructureInfoNV* info) {
 /* ---- What the host can see ------------------------------------------------------------- */
 
 VkResult rtrCmdDeclareScene(RtrRecorder r, uint32_t count, const RtrAccelerationStructure* structures) {
-    RtrDeclaredScene scene = {~0u, ~0u, ~0u, 0};
+    RtrDeclaredScene scene = RTR_NOTHING_DECLARED;
     uint32_t i, g;
     VkResult result;
     if (!r->cmd) return rtr_not_begun(r, "rtrCmdDeclareScene");
@@ -80,6 +80,18 @@ VkResult rtrCmdDeclareScene(RtrRecorder r, uint32_t count, const RtrAcceleration
             if (as->geometries[g].flags & VK_GEOMETRY_OPAQUE_BIT_NV) continue;
             scene.not_opaque = i;
             scene.not_opaque_geometry = g;
+        }
+    }
+    for (i = 0; i < count; i++) {
+        const struct RtrAccelerationStructure_T* as = structures[i];
+        const uint32_t heap = as->heap ? as->heap->id : 0;
+        if (!as->buffer) continue;
+        if (!scene.bound) {
+            scene.bound = true;
+            scene.heap = heap;
+            scene.at = i;
+        } else if (heap != scene.heap && scene.elsewhere == ~0u) {
+            scene.elsewhere = i;
         }
     }
     r->scene = scene;
@@ -113,6 +125,21 @@ VkResult rtr_check_scene(RtrRecorder r, const struct RtrPipeline_T* p) {
                      "the module assumes '%s', but %sstructure %u of rtrCmdDeclareScene %s: %s, or compile without "
                      "--assume=%s",
                      a->name, geometry, at, a->broken, a->remedy, a->name);
+}
+
+VkResult rtr_check_scene_heap(RtrRecorder r, const struct RtrPipeline_T* p) {
+    const RtrDeclaredScene* s = &r->scene;
+    const bool addresses = p->header.flags & RTC_MODULE_ADDRESS_MODE;
+    const uint32_t wanted = addresses ? 0 : r->heap ? r->heap->id : 0;
+    uint32_t at;
+    /* A module that traces nothing in heap mode has no heap. */
+    if (!s->bound || (!addresses && !(p->header.used_bindings >> RTC_BINDING_HEAP_TEXELS & 3))) return VK_SUCCESS;
+    if (s->heap == wanted && s->elsewhere == ~0u) return VK_SUCCESS;
+    at = s->heap == wanted ? s->elsewhere : s->at;
+    return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "other-heap",
+                     "structure %u of rtrCmdDeclareScene does not lie %s: no ray of this launch can reach it", at,
+                     addresses ? "at a device address, where this module (--addressing=address) looks"
+                               : "in the heap of rtrCmdSetHeap");
 }
 
 /* ---- Scene profiles ------------------------------------------------------------------------ */

@@ -29,6 +29,7 @@ VkResult rtrCreateHeap(RtrDevice d, const RtrHeapCreateInfo* info, const VkAlloc
     h->buffer = info->buffer;
     h->offset = info->offset;
     h->size = info->size / RTC_AS_ALIGNMENT * RTC_AS_ALIGNMENT;
+    h->id = RTC_HEAP_TAG | (atomic_fetch_add_explicit(&d->heaps, 1, memory_order_relaxed) + 1);
     view.buffer = h->buffer;
     view.format = VK_FORMAT_R32G32B32A32_UINT;
     view.offset = h->offset;

@@ -160,6 +160,7 @@ struct RtrDevice_T {
     VkDescriptorSetLayout empty_layout;
     VkPipelineLayout kernel_layout;
     uint32_t level_nodes; /* levels of this many nodes are fitted in a dispatch each (build_phases.c) */
+    atomic_uint heaps; /* created so far: their numbers */
     bool validation;
     /* With validation: the structures that are bound and not destroyed (live.c). */
     atomic_flag live_lock;
@@ -179,6 +180,7 @@ struct RtrHeap_T {
     bool has_allocator;
     VkBuffer buffer;
     VkDeviceSize offset, size;
+    uint32_t id; /* RTC_HEAP_TAG | its number: the upper half of handles */
     VkBufferView view;
     RtrHeapRange* used; /* sorted by offset */
     uint32_t used_count, used_capacity;
@@ -199,7 +201,7 @@ struct RtrAccelerationStructure_T {
     VkBuffer buffer;
     VkDeviceSize offset; /* in the buffer */
     RtrHeap heap;        /* NULL in address mode */
-    uint64_t base;       /* the handle: quads from the heap's start, or a device address */
+    uint64_t base;       /* the handle: the heap's id, quads from its start; or a device address */
     struct RtrBuilt* built; /* built.c; NULL: not known */
     struct RtrAccelerationStructure_T *live_next, *live_before; /* in RtrDevice_T::live */
 };
@@ -236,7 +238,13 @@ typedef struct RtrLaunchPlace {
 typedef struct RtrDeclaredScene {
     uint32_t triangles, aabbs, not_opaque;
     uint32_t not_opaque_geometry;
+    bool bound;    /* some of it */
+    uint32_t heap; /* id of the heap of the first that is bound; 0: bound to a buffer */
+    uint32_t at;   /* the first that is bound, and the first that lies elsewhere than that */
+    uint32_t elsewhere;
 } RtrDeclaredScene;
+#define RTR_NOTHING_DECLARED \
+    ((RtrDeclaredScene){.triangles = ~0u, .aabbs = ~0u, .not_opaque = ~0u, .elsewhere = ~0u})
 
 /* A structure of the declared scene (its index there), or one that this recording built
  * (RTC_ERROR_BUILT). */
@@ -327,6 +335,8 @@ void rtr_format_assumption(uint32_t fact, uint32_t offender, char* text, size_t 
 uint32_t rtr_first_not_opaque(const VkAccelerationStructureInfoNV* info);
 /* Whether the declared scene is what the pipeline's module assumes, as far as the host can see. */
 VkResult rtr_check_scene(RtrRecorder recorder, const struct RtrPipeline_T* pipeline);
+/* Whether it lies where the pipeline's rays look for it: in the heap that is set, or at device addresses. */
+VkResult rtr_check_scene_heap(RtrRecorder recorder, const struct RtrPipeline_T* pipeline);
 
 /* ---- Recording helpers ---------------------------------------------------------------- */
 VkResult rtr_allocate_set(RtrRecorder recorder, VkDescriptorSetLayout layout, VkDescriptorSet* set);

@@ -50,6 +50,20 @@ static void describe_damage(const RtrLaunchError* e, char* text, size_t size) {
     snprintf(text, size, "acceleration structure memory is damaged: in %s a ray met %s", where, met);
 }
 
+static void describe_elsewhere(const RtrLaunchError* e, char* text, size_t size) {
+    const uint32_t structure = e->detail[0] & ~RTC_HEAP_TAG, set = e->detail[1] & ~RTC_HEAP_TAG;
+    char where[80], looked[80];
+    if (e->detail[0] & RTC_HEAP_TAG)
+        snprintf(where, sizeof where, "lies in heap %u of the RtrDevice", structure);
+    else
+        snprintf(where, sizeof where, "lies at a device address, or was never built");
+    if (e->detail[0] & RTC_HEAP_TAG && !(e->detail[1] & RTC_HEAP_TAG))
+        snprintf(looked, sizeof looked, "the module was linked with --addressing=address");
+    else
+        snprintf(looked, sizeof looked, "rtrCmdSetHeap set heap %u", set);
+    snprintf(text, size, "the acceleration structure of a ray %s, and %s: the ray missed", where, looked);
+}
+
 void rtrFormatLaunchError(const RtrLaunchError* e, char* text, size_t size) {
     char what[384];
     switch (e->code) {
@@ -116,6 +130,9 @@ void rtrFormatLaunchError(const RtrLaunchError* e, char* text, size_t size) {
                 what, sizeof what,
                 "an acceleration structure is not of this ABI version, or no structure (word read: 0x%08x)",
                 e->detail[0]);
+            break;
+        case RTC_LAUNCH_ERROR_HEAP:
+            describe_elsewhere(e, what, sizeof what);
             break;
         case RTC_LAUNCH_ERROR_ASSUMPTION:
             rtr_format_assumption(e->detail[0], e->detail[1], what, sizeof what);

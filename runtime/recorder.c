@@ -54,7 +54,7 @@ VkResult rtrBeginRecorder(RtrRecorder r, VkCommandBuffer cmd) {
     r->set_call_count = 0;
     r->push_size = 0;
     r->stack_size = 0;
-    memset(&r->scene, 0xff, sizeof r->scene); /* nothing is declared */
+    r->scene = RTR_NOTHING_DECLARED;
     r->checked_count = 0;
     return VK_SUCCESS;
 }

@@ -187,6 +187,7 @@ static void fill_params(const Launch* l, uint32_t tile, uint32_t round, uint32_t
         w[RTC_PARAM_LIVE_COUNT] = l->live_count;
     }
     w[RTC_PARAM_HEAP_QUADS] = l->r->heap ? (uint32_t)(l->r->heap->size / RTC_QUAD_BYTES) : 0;
+    w[RTC_PARAM_HEAP_ID] = l->r->heap ? l->r->heap->id : 0;
     w[RTC_PARAM_FLAGS] = l->shape.tile_8x4 ? RTC_LAUNCH_TILE_8X4 : 0;
 }
 
@@ -552,6 +553,7 @@ static VkResult trace(RtrRecorder r, const RtrStridedBufferRegion* raygen, const
     if ((l.p->header.used_bindings >> RTC_BINDING_HEAP_TEXELS & 3) && !r->heap)
         return rtr_error(r->device, VK_ERROR_VALIDATION_FAILED_EXT, "no-heap",
                          "rtrCmdTraceRays: rtrCmdSetHeap first");
+    if ((result = rtr_check_scene_heap(r, l.p)) != VK_SUCCESS) return result;
     if (r->heap && l.p->options.fetch == RTR_FETCH_STORAGE &&
         r->heap->size > r->device->limits.maxStorageBufferRange)
         return rtr_error(

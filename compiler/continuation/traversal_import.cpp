@@ -73,7 +73,7 @@ constexpr const char* kCalled[] = {
     "rtc_object_ray_origin", "rtc_object_ray_direction", "rtc_hit_positions",     "rtc_sbt_raygen_word",
     "rtc_sbt_miss_word",
     "rtc_sbt_hit_word",      "rtc_sbt_callable_word",    "rtc_miss_record",       "rtc_hit_record_base",
-    "rtc_callable_record",   "rtc_error",                "rtc_scratch_load",      "rtc_scratch_store",
+    "rtc_callable_record",   "rtc_error",                "rtc_root",              "rtc_scratch_load",      "rtc_scratch_store",
     "rtc_trace_save",        "rtc_trace_restore"};
 
 std::map<std::string, Id> exports_of(const ir::Module& module) {

@@ -238,14 +238,10 @@ class Interface {
                                 return e.chain(StorageClass::StorageBuffer, p_.uint_type(), inst.ops[0],
                                                {p_.constant_u32(0), p_.constant_u32(word)});
                             };
-                            if (m_.addresses()) {
-                                const Id low = e.load(p_.uint_type(), self(RTC_HDR_SELF_LO));
-                                const Id high = e.load(p_.uint_type(), self(RTC_HDR_SELF_HI));
-                                inst.op = Op::OpCompositeConstruct;
-                                inst.ops = {low, high};
-                            } else {
-                                inst.ops = {self(RTC_HDR_SELF_LO)};
-                            }
+                            const Id low = e.load(p_.uint_type(), self(RTC_HDR_SELF_LO));
+                            const Id high = e.load(p_.uint_type(), self(RTC_HDR_SELF_HI));
+                            inst.op = Op::OpCopyObject;
+                            inst.ops = {m_.call(e, "rtc_root", {low, high})};
                         }
                     }
                     if (inst.result && p_.is_pointer(inst.type)) pointer_types[inst.result] = inst.type;

@@ -11,7 +11,7 @@
 #ifndef RTC_ABI_H_
 #define RTC_ABI_H_
 
-#define RTC_ABI_VERSION 1u
+#define RTC_ABI_VERSION 2u
 
 /* ---- Acceleration structures ------------------------------------------------
  *
@@ -24,10 +24,13 @@
  *
  * All references inside the block are relative to its base, except the
  * references of instance records to their bottom-level structures.
- * The base of a block is its distance from the start of the AS heap in quads
- * (heap mode) or its device address (address mode). Base 0 means "null
- * acceleration structure": every ray misses it. Heap quad 0 is never given out.
+ * The base of a block is, in address mode, its device address. In heap mode its lower
+ * half is the distance from the start of the AS heap in quads, its upper half the heap's
+ * id: RTC_HEAP_TAG | 1 for the first heap of an RtrDevice, and so on, so that neither a
+ * structure of another heap nor one at a device address is taken for it. Base 0 means
+ * "null acceleration structure": every ray misses it. Heap quad 0 is never given out.
  */
+#define RTC_HEAP_TAG 0x80000000u /* no device address has it */
 #define RTC_QUAD_BYTES 16u
 #define RTC_AS_ALIGNMENT 256u /* bytes */
 #define RTC_AS_HEADER_QUADS 16u /* 256 bytes */
@@ -207,6 +210,7 @@
 #define RTC_PARAM_FLAGS 32u /* RTC_LAUNCH_* */
 #define RTC_PARAM_LIVE_TABLE 33u /* checking traversal: word in the control buffer where the table of live structures starts; 0: none */
 #define RTC_PARAM_LIVE_COUNT 34u /* its entries: base low, high, quads of the object, 0; sorted by base */
+#define RTC_PARAM_HEAP_ID 35u /* upper half of the bases in the heap that is set; 0: none */
 #define RTC_LAUNCH_TILE_8X4 1u /* lanes walk 8x4 pixel tiles; otherwise rows */
 
 /* Lanes: lane = LANE_BASE + gl_WorkGroupID (x + 65535 y, linearised) * workgroup
@@ -241,6 +245,7 @@
 #define RTC_LAUNCH_ERROR_BAD_INSTANCE 9u /* validation: detail: instance; detail2: structure of the declared scene, or RTC_ERROR_BUILT */
 #define RTC_LAUNCH_ERROR_BAD_UPDATE 10u /* validation: detail: RTC_HDR_BAD_UPDATE; detail2 as for BAD_INSTANCE */
 #define RTC_LAUNCH_ERROR_BAD_MEMORY 11u /* modules linked --checked: acceleration structure memory is damaged; detail: number read */
+#define RTC_LAUNCH_ERROR_HEAP 12u /* a structure elsewhere than in the heap that is set; detail: upper half of its base; detail2: id of the heap that is set, 0 by device address */
 /* DETAIL2 of BAD_MEMORY: what the number is, and the instance the ray was in (its lower bits; all ones: the top level). */
 #define RTC_BAD_SHIFT 28u
 #define RTC_BAD_INSTANCE_MASK 0x0fffffffu

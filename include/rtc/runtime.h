@@ -329,7 +329,9 @@ typedef struct RtrBindAccelerationStructureMemoryInfo {
 
 /* Counterpart: vkBindAccelerationStructureMemoryNV; with a buffer, where
  * VkAccelerationStructureCreateInfoKHR names it. Once per object. A bottom level and every
- * top level that refers to it must be in the same heap, or both bound to buffers.
+ * top level that refers to it must be in the same heap, or both bound to buffers: an instance
+ * of a bottom level elsewhere becomes inactive when the top level is built, and the header's
+ * RTC_HDR_BAD_INSTANCE names it (with RtrDeviceCreateInfo::validation so do launches).
  * Errors: VALIDATION_FAILED for ranges, for both or neither of heap and buffer;
  * FEATURE_NOT_PRESENT for a buffer on a device without bufferDeviceAddress. */
 RTR_API VkResult rtrBindAccelerationStructureMemory(RtrDevice device, uint32_t bindInfoCount,
@@ -337,7 +339,7 @@ RTR_API VkResult rtrBindAccelerationStructureMemory(RtrDevice device, uint32_t b
 
 /* The 64-bit reference for VkAccelerationStructureInstanceNV::accelerationStructureReference:
  * in address mode the device address of the structure, otherwise a number only the runtime
- * understands. dataSize must be 8 or more. Counterpart: vkGetAccelerationStructureHandleNV. */
+ * understands, different for any two structures of all the device's heaps. dataSize must be 8 or more. Counterpart: vkGetAccelerationStructureHandleNV. */
 RTR_API VkResult rtrGetAccelerationStructureHandle(RtrDevice device,
                                                    RtrAccelerationStructure accelerationStructure,
                                                    size_t dataSize, void* pData);
@@ -370,8 +372,10 @@ RTR_API VkResult rtrUpdateAccelerationStructureDescriptors(
  * opacity where the module assumes no instance flags), rather than by the device alone.
  * Optional; replaces what was declared before; forgotten by rtrBeginRecorder. With
  * RtrDeviceCreateInfo::validation the device looks at its top levels before each launch. count 0:
- * nothing is declared. Structures made by copies tell the host nothing. A launch that cannot
- * be right fails with VALIDATION_FAILED ("assumption") and is not recorded. */
+ * nothing is declared. Structures made by copies tell the host nothing of their geometry. A launch
+ * that cannot be right fails with VALIDATION_FAILED and is not recorded: "assumption", or
+ * "other-heap" when one of them lies in another heap than that of rtrCmdSetHeap (or the module is of
+ * the other addressing mode). No counterpart. */
 RTR_API VkResult rtrCmdDeclareScene(RtrRecorder recorder, uint32_t count,
                                     const RtrAccelerationStructure* pAccelerationStructures);
 

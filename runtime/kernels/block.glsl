@@ -1,14 +1,15 @@
 // Reading another acceleration structure: by the heap's texels, or in address mode
 // (RTR_ADDRESS) by its device address.
 
-// Whether the reference leads to a structure that was built. A device address can only be
-// followed on trust.
+// Whether the reference leads to a structure that was built, beside the destination: in its heap, or
+// like it at a device address. A device address can only be followed on trust.
 bool is_structure(uint base_lo, uint base_hi) {
 #ifdef RTR_ADDRESS
+    if ((base_hi & RTC_HEAP_TAG) != 0u) return false;
     uvec4 h1 = block_quad(base_lo, base_hi, RTC_HDR_FACTS / 4u);
     if ((h1.x & RTC_FACT_ADDRESSES) == 0u) return false;
 #else
-    if (base_hi != 0u || base_lo > p.heap_quads - RTC_AS_HEADER_QUADS) return false;
+    if (base_hi != p.self_hi || base_lo > p.heap_quads - RTC_AS_HEADER_QUADS) return false;
 #endif
     return block_quad(base_lo, base_hi, RTC_HDR_MAGIC / 4u).z == RTC_AS_MAGIC;
 }

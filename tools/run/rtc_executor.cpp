@@ -37,6 +37,8 @@ const char* launch_error_name(uint32_t code) {
             return "stack";
         case RTC_LAUNCH_ERROR_BAD_INSTANCE:
             return "bad-instance";
+        case RTC_LAUNCH_ERROR_HEAP:
+            return "heap";
         default:
             return "unknown";
     }

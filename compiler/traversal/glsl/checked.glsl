@@ -37,7 +37,7 @@ uint rtc_check_base(RtcBase base) {
 #ifdef RTC_ADDRESS_MODE
     uvec2 wanted = base;
 #else
-    uvec2 wanted = uvec2(base, 0u);
+    uvec2 wanted = uvec2(base, rtc_param(RTC_PARAM_HEAP_ID));
 #endif
     uint table = rtc_param(RTC_PARAM_LIVE_TABLE);
     uint quads = 0xffffffffu;

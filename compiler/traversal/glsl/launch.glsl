@@ -53,6 +53,22 @@ void rtc_error(uint kind, uint detail, uint detail2) {
     }
 }
 
+// What a ray starts at: the base in the header that a descriptor shows. Rays look for it in the heap that is set, or
+// by device address; a structure that is elsewhere is an error, and they miss.
+RtcBase rtc_root(uint low, uint high) {
+#ifdef RTC_ADDRESS_MODE
+    uint heap = 0u;
+    bool here = (high & RTC_HEAP_TAG) == 0u;
+#else
+    uint heap = rtc_param(RTC_PARAM_HEAP_ID);
+    bool here = high == heap || (low | high) == 0u;
+#endif
+    if (!here) {
+        rtc_error(RTC_LAUNCH_ERROR_HEAP, high, heap);
+    }
+    return rtc_base(here ? low : 0u, here ? high : 0u);
+}
+
 // Asks for another round of this dispatch's shape.
 void rtc_suspend() {
     uint block = rtc_param(RTC_PARAM_CONTROL_WORD);

@@ -17,6 +17,7 @@ void main() {
 #else
     RtcBase root = 1u;
 #endif
+    rtc_ray_root = rtc_root(rtc_lane, 1u);
     rtc_trace_begin();
     uint sum = rtc_trace_step();
     rtc_trace_accept();

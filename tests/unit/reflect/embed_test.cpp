@@ -77,7 +77,7 @@ TEST(Embed, HeaderAndGroupsStandBeforeTheJson) {
     const std::string base64 =
         text.substr(begin + prefix.size(), text.find('"', begin + 1) - begin - prefix.size());
     // 24 header words: their first three as base64 decode to "RTMF", the version and the flags.
-    EXPECT_EQ(base64.substr(0, 16), "UlRNRgEAAAABAAAA");
+    EXPECT_EQ(base64.substr(0, 16), "UlRNRgIAAAABAAAA");
     EXPECT_EQ(sizeof(RtcModuleHeader), 96u);
     EXPECT_EQ(sizeof(RtcModuleGroup), 36u);
 }
@@ -144,13 +144,13 @@ TEST(Embed, AnotherAbiVersionIsRefused) {
     auto* bytes = reinterpret_cast<char*>(module.data());
     char* at = std::strstr(bytes + 20, "UlRNR");
     for (char* p = bytes + 20; !at && p < bytes + module.size() * 4 - 8; ++p)
-        if (std::memcmp(p, "UlRNRgEAAAAB", 12) == 0) at = p;
+        if (std::memcmp(p, "UlRNRgIAAAAB", 12) == 0) at = p;
     ASSERT_NE(at, nullptr);
-    std::memcpy(at, "UlRNRgIAAAAB", 12);
+    std::memcpy(at, "UlRNRgMAAAAB", 12);
     rtc::Reflection out;
     std::string error;
     EXPECT_FALSE(rtc::read_reflection(module, out, error));
-    EXPECT_THAT(error, HasSubstr("ABI version 2"));
+    EXPECT_THAT(error, HasSubstr("ABI version 3"));
 }
 
 TEST(Embed, AModuleThatIsNoneIsLeftAlone) {

@@ -87,7 +87,7 @@ TEST(Json, DamageIsAnError) {
     EXPECT_FALSE(rtc::reflection_from_json("[]", out, error));
     EXPECT_FALSE(rtc::reflection_from_json("{\"abiVersion\": \"x\"}", out, error));
     std::string other = whole;
-    other.replace(other.find("\"abiVersion\": 1"), 15, "\"abiVersion\": 7");
+    other.replace(other.find("\"abiVersion\": 2"), 15, "\"abiVersion\": 7");
     EXPECT_FALSE(rtc::reflection_from_json(other, out, error));
     EXPECT_THAT(error, HasSubstr("ABI version 7"));
 }

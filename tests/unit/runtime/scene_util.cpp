@@ -181,7 +181,7 @@ const uint32_t* Scene::words(RtrAccelerationStructure as) const {
 }
 
 const uint32_t* Scene::block(uint64_t handle) const {
-    return heap_buffer.as<uint32_t>(address_mode ? handle - address_ : handle * RTC_QUAD_BYTES);
+    return heap_buffer.as<uint32_t>(address_mode ? handle - address_ : (handle & 0xffffffffu) * RTC_QUAD_BYTES);
 }
 
 VkAccelerationStructureInstanceNV Scene::instance(RtrAccelerationStructure as) const {

@@ -113,9 +113,18 @@ class StagesTest : public RuntimeTest {
         Scene scene(*vk, rtr, 1 << 20, address_mode);
         auto bottom = scene.build_bottom(
             {scene.triangles({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {2, 0, 0}, {3, 0, 0}, {2, 1, 0}})});
-        auto top = scene.build_top({scene.instance(bottom)});
+        EXPECT_EQ(trace(scene, scene.heap, scene.build_top({scene.instance(bottom)})).code, RTC_LAUNCH_ERROR_NONE);
+        EXPECT_EQ(said[0], base + 50);
+        EXPECT_EQ(said[1], base + 51);
+        EXPECT_EQ(said[2], base + 7);
+    }
+
+    // Rays at x = 0.1, 2.1 and 4.1 into a top level, with this heap set; what they say is in `said`.
+    RtrLaunchError trace(Scene& scene, RtrHeap heap, RtrAccelerationStructure top) {
+        RtrLaunchError error{};
         Buffer result = scene.upload(nullptr, 64);
-        ASSERT_EQ(rtrUpdateAccelerationStructureDescriptors(rtr, set, 0, 0, 1, &top, nullptr), VK_SUCCESS);
+        memset(result.data, 0, 64);
+        EXPECT_EQ(rtrUpdateAccelerationStructureDescriptors(rtr, set, 0, 0, 1, &top, null_heap), VK_SUCCESS);
         VkDescriptorBufferInfo info{result.handle, 0, VK_WHOLE_SIZE};
         VkWriteDescriptorSet w{VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET};
         w.dstSet = set;
@@ -127,26 +136,28 @@ class StagesTest : public RuntimeTest {
         RtrSbtRecord raygen{0, 0, nullptr}, miss{1, 0, nullptr}, hit{2, 0, nullptr};
         RtrSbtInfo sbt_info{1, &raygen, 1, &miss, 1, &hit, 0, nullptr};
         RtrSbtLayout table;
-        ASSERT_EQ(rtrGetSbtLayout(rtr, &sbt_info, &table), VK_SUCCESS);
+        EXPECT_EQ(rtrGetSbtLayout(rtr, &sbt_info, &table), VK_SUCCESS);
         Buffer sbt = scene.upload(nullptr, table.size);
-        ASSERT_EQ(rtrWriteSbt(rtr, pipeline, &sbt_info, &table, sbt.data), VK_SUCCESS);
+        EXPECT_EQ(rtrWriteSbt(rtr, pipeline, &sbt_info, &table, sbt.data), VK_SUCCESS);
         VkDeviceSize scratch_size = rtrGetLaunchScratchSize(rtr, pipeline, 3, 1, 1, nullptr);
         Buffer scratch = scene.upload(nullptr, scratch_size);
+        VkDescriptorBufferInfo place{};
         scene.run([&] {
             auto rec = scene.recorder;
             rtrCmdBindPipeline(rec, pipeline);
             rtrCmdBindDescriptorSets(rec, 0, 1, &set, 0, nullptr);
-            if (scene.heap) rtrCmdSetHeap(rec, scene.heap);
+            if (heap) rtrCmdSetHeap(rec, heap);
             if (scratch_size) rtrCmdSetLaunchScratch(rec, scratch.handle, 0, scratch_size);
             EXPECT_EQ(rtrCmdTraceRays(rec, sbt.handle, table.raygen.offset, sbt.handle, table.miss.offset,
                                       table.miss.stride, sbt.handle, table.hit.offset, table.hit.stride,
                                       VK_NULL_HANDLE, 0, 0, 3, 1, 1),
                       VK_SUCCESS);
             EXPECT_EQ(rtrGetLaunchCount(rec), 1u);
+            EXPECT_EQ(rtrGetLaunchErrorLocation(rec, 0, &place), VK_SUCCESS);
         });
-        EXPECT_EQ(result.as<uint32_t>()[0], base + 50);
-        EXPECT_EQ(result.as<uint32_t>()[1], base + 51);
-        EXPECT_EQ(result.as<uint32_t>()[2], base + 7);
+        for (int i = 0; i < 3; i++) said[i] = result.as<uint32_t>()[i];
+        rtrDecodeLaunchError(scene.control.as<uint32_t>(place.offset), &error);
+        return error;
     }
 
     rtcc_compiler_t compiler = nullptr;
@@ -158,5 +169,6 @@ class StagesTest : public RuntimeTest {
     VkDescriptorPool pool = VK_NULL_HANDLE;
     VkDescriptorSet set = VK_NULL_HANDLE;
     RtrPipeline pipeline = nullptr;
-    uint32_t recursion = 1, base = 1000;
+    RtrHeap null_heap = nullptr;  // of structures that are NULL
+    uint32_t recursion = 1, base = 1000, said[3] = {0, 0, 0};
 };

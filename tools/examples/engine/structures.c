@@ -113,8 +113,8 @@ static void compact(Gpu* gpu, Structures* s, RtrRecorder recorder, const Buffer*
 void structures_create(Gpu* gpu, const Scene* scene, const Resources* resources, Structures* s) {
     memset(s, 0, sizeof *s);
     /* [guide: heap] */
-    const VkDeviceSize heapBytes = 4u
-                                   << 20; /* a real engine asks the requirements first, or grows by heaps */
+    /* A real engine asks the requirements first: all that a launch reaches lies in one heap. */
+    const VkDeviceSize heapBytes = 4u << 20;
     s->heapBuffer = buffer_create(gpu, heapBytes, RTR_HEAP_BUFFER_USAGE, MEMORY_DEVICE);
     RtrHeapCreateInfo heap = {0};
     heap.buffer = s->heapBuffer.handle;
