@@ -53,6 +53,7 @@ class RtcRun(unittest.TestCase):
         self.fails("No such file or directory", *HELLO, "-o", "/nowhere/out.png")
         self.fails("maxImageDimension2D", *HELLO, "--size", "999999x2")
         self.fails("rtc-run: error: ", *HELLO, "--repeat", "often")
+        self.fails("no such assumption: flat", *HELLO, "--assume", "flat")
         self.fails("unknown image pattern", *HELLO, "--bind", "0.1=pattern:nothing")
 
     def test_bad_shaders(self):
@@ -121,6 +122,19 @@ class RtcRun(unittest.TestCase):
             self.assertEqual(json.load(file)["r"][:2], [5, 0])
         self.fails("is a buffer", "--case", self.case(5), "-o", os.path.join(self.folder.name, "out.png"))
         self.fails("unknown key", "--case", self.case(5, colour="red"))
+
+    def test_specialisation_and_statistics(self):
+        """What is known may be left out; the outputs stay the same, and broken promises are told."""
+        size = {}
+        for name, options in {"known": [], "open": ["--no-specialize"], "promised": ["--assume=single-level"]}.items():
+            module = os.path.join(self.folder.name, name + ".spv")
+            code, said = run(*HELLO, "--size", "8x8", "--statistics", "--save-module", module, *options)
+            self.assertEqual(code, 0, said)
+            self.assertRegex(said, r"rtc: pipeline \d")
+            self.assertRegex(said, r"rtc: (this driver tells no statistics of pipelines|.* \d)")
+            size[name] = os.path.getsize(module)
+        self.assertLess(size["known"], size["open"])
+        self.assertLess(size["promised"], size["open"])
 
     def test_pictures_and_scene_files(self):
         """Every kind of output from one run, over a scene of a file."""

@@ -102,7 +102,7 @@ std::string facts_text(const std::vector<std::pair<std::string, uint32_t>>& with
     std::string out = "instructions removed by one fact alone, the others known:\n";
     for (const auto& [fact, instructions] : without)
         out += "  " + padded(fact, width) + "  " + std::to_string(int64_t(instructions) - now.instruction_count) + "\n";
-    return out + "Registers and compile times are a driver's: rtc-bench specialise measures them.\n";
+    return out + "Registers and compile times are a driver's: rtc-run --statistics, with and without --no-specialize, prints them.\n";
 }
 
 }  // namespace cli

@@ -16,6 +16,7 @@ Host::Host(std::set<Backend> backends, const Options& options) {
     context.validate = options.validate;
     context.all_core_features = true;
     context.print_device = options.print_device;
+    if (options.statistics) tools::want_pipeline_statistics(context, statistics_);
     if (backends.count(Backend::Khr)) khr_.apply(context);
     if (backends.count(Backend::Nv)) nv_.apply(context);
     context_ = std::make_unique<native::Context>(context);
@@ -28,7 +29,7 @@ RunResult Host::run(Backend backend, const Job& job, const RtcOptions& options, 
         case Backend::Rtc: {
             RtcOptions chosen = options;
             if (!job.addressing.empty()) chosen.addressing = tools::addressing_from_name(job.addressing);
-            chosen.assume = job.assume;
+            if (!job.assume.empty()) chosen.assume = job.assume;
             executor = make_rtc(*rtc_, chosen);
             break;
         }

@@ -5,6 +5,7 @@
 #include <set>
 #include <string>
 
+#include "pipeline_statistics.h"
 #include "rtc_executor.h"
 #include "session.h"
 
@@ -26,7 +27,7 @@ class Host {
   public:
     struct Options {
         std::string device;
-        bool validate = false, print_device = true;
+        bool validate = false, print_device = true, statistics = false;
     };
     Host(std::set<Backend> backends, const Options& options);
     RunResult run(Backend backend, const Job& job, const RtcOptions& options, unsigned repeats = 1);
@@ -34,6 +35,7 @@ class Host {
 
   private:
     native::Requirements khr_{native::Requirements::Kind::Khr}, nv_{native::Requirements::Kind::Nv};
+    VkPhysicalDevicePipelineExecutablePropertiesFeaturesKHR statistics_{};
     std::unique_ptr<native::Context> context_;
     std::unique_ptr<RtcDevice> rtc_;
 };

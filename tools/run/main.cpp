@@ -17,7 +17,8 @@ struct CommandLine {
     std::string scene, size, native_kind, device, case_file, push, table, suite, filter, json, save, oracle,
         save_oracle;
     double limit = 0;
-    std::string shard, addressing, accuracy = "watertight";
+    std::string shard, addressing, accuracy = "watertight", assume;
+    bool no_specialize = false, statistics = false;
     bool compare = false, validate = false, list = false, verbose = false, optimize = false, print = false;
     uint32_t recursion = 0, callable_depth = 0, repeats = 1, budget = 0, rounds = 0, timeout = 120;
     int resumable = -1, fetch = -1;
@@ -206,7 +207,7 @@ void print_timing(const char* who, const Job& job, const RunResult& result) {
 }
 
 int run(const CommandLine& c) {
-    Host::Options host_options{c.device, c.validate, true};
+    Host::Options host_options{c.device, c.validate, true, c.statistics};
     RtcOptions rtc;
     rtc.optimize = c.optimize;
     rtc.resumable = c.resumable;
@@ -215,6 +216,9 @@ int run(const CommandLine& c) {
     rtc.fetch = c.fetch;
     rtc.addressing = tools::addressing_from_name(c.addressing);
     rtc.accuracy = c.accuracy;
+    rtc.assume = c.assume;
+    rtc.specialize = !c.no_specialize;
+    rtc.statistics = c.statistics;
     rtc.save_module = c.save;
     if (!c.suite.empty()) {
         SuiteOptions suite;
@@ -332,6 +336,9 @@ int main(int argc, char** argv) {
     app.add_option("--addressing", c.addressing,
                    "acceleration structures in a heap or by address (default: as the device recommends)")
         ->check(CLI::IsMember({"heap", "address"}));
+    app.add_option("--assume", c.assume, "promises about the scene, as rtc takes them");
+    app.add_flag("--no-specialize", c.no_specialize, "remove nothing for what is known, as rtc --no-specialize");
+    app.add_flag("--statistics", c.statistics, "print what the driver tells of rtc's pipeline: registers, spills, code size");
     app.add_option("--accuracy", c.accuracy, "the traversal that is linked (watertight)")
         ->check(CLI::IsMember({"fast", "watertight", "exact", "exact64"}));
     app.add_option("--fetch", c.fetch, "a heap through 0 texels, 1 a storage buffer");

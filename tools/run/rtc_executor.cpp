@@ -10,6 +10,8 @@
 #include <map>
 #include <fstream>
 
+#include "pipeline_statistics.h"
+
 namespace rtc::run {
 namespace {
 
@@ -205,12 +207,14 @@ class RtcExecutor final : public Executor {
         info.pushConstantRangeCount = push_bytes ? 1 : 0;
         info.pPushConstantRanges = &range;
         info.pOptions = &trace_options;
+        if (options_.statistics) info.flags = tools::statistics_flag(context_);
         VkResult made = rtrCreateRayTracingPipeline(device_, VK_NULL_HANDLE, &info, nullptr, &pipeline_);
         // Not a limit that the module exceeds, but something the shaders ask for by name.
         if (made == VK_ERROR_FEATURE_NOT_PRESENT && said_.find("the module needs the ") != std::string::npos)
             throw tools::MissingFeature("the device cannot run the module:" + said_);
         need(made, "rtrCreateRayTracingPipeline");
         group_count_ = uint32_t(pipeline.groups.size());
+        if (options_.statistics) print_statistics();
     }
 
     void set_tables(const native::Tables& tables) override {
@@ -310,6 +314,14 @@ class RtcExecutor final : public Executor {
     }
 
   private:
+    void print_statistics() {
+        RtrPipelineInfo info{};
+        rtrGetPipelineInfo(pipeline_, &info);
+        const auto told = tools::pipeline_statistics(context_, info.pipeline);
+        for (const auto& [what, value] : told) std::printf("rtc: %s %s\n", what.c_str(), value.c_str());
+        if (told.empty()) std::printf("rtc: this driver tells no statistics of pipelines\n");
+    }
+
     void need(VkResult result, const char* what) {
         if (result == VK_SUCCESS) return;
         throw Error(std::string(what) + ": " + tools::result_name(result) + said_);
@@ -376,6 +388,7 @@ class RtcExecutor final : public Executor {
         rtcc_options_set_accuracy(options, kTiers.at(options_.accuracy));
         if (rtcc_options_assume(options, options_.assume.c_str()) != RTCC_STATUS_SUCCESS)
             throw Error("no such assumption: " + options_.assume);
+        rtcc_options_set_specialize(options, options_.specialize);
         rtcc_options_set_resumable(options, options_.resumable < 0 ? needed : options_.resumable);
         for (const tools::JobShader& shader : job.shaders) {
             int32_t stage = rtcc_pipeline_add_spirv(pipeline, stage_of(shader.stage), shader.name.c_str(),

@@ -22,6 +22,8 @@ struct RtcOptions {
     tools::Addressing addressing = tools::Addressing::Recommended;
     std::string accuracy = "watertight";  // tier of the traversal
     std::string assume;        // promises about the scene, by name
+    bool specialize = true;    // false: nothing is removed for what is known
+    bool statistics = false;   // print what the driver tells of the pipeline
     std::string save_module;   // writes the linked module there
     bool print_warnings = true;
 };
