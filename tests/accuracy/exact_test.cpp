@@ -3,8 +3,10 @@
 #include <cmath>
 #include <fstream>
 #include <iterator>
+#include <limits>
 
 #include "cases.h"
+#include "denormals.h"
 #include "lab_fixture.h"
 #include "leaks.h"
 #include "meshes.h"
@@ -22,7 +24,7 @@ double ulps(double a, double b) {
 }
 
 struct Outcome {
-    uint64_t hits = 0, different = 0, ties = 0, edges = 0;
+    uint64_t hits = 0, different = 0, excused = 0, ties = 0, edges = 0;
     double worst_t = 0;
     std::string first;
 };
@@ -45,7 +47,9 @@ Outcome compare(DeviceTracer& tracer, const ExactCase& c, uint64_t count) {
         const bool same = e ? hit && g.instance == e->instance && g.geometry == e->geometry &&
                                   g.primitive == e->primitive
                             : !hit;
-        if (!same && out.different++ == 0) {
+        const bool denormal = denormals_at_stake(scene, rays[i], e, g);
+        if (!same && denormal) ++out.excused;
+        if (!same && !denormal && out.different++ == 0) {
             char text[512];
             std::snprintf(text, sizeof text,
                           "ray %zu o %a %a %a d %a %a %a t %a..%a: expected %d %d/%d/%d t %.17g, got %d %d/%d/%d t %.9g", i,
@@ -55,7 +59,7 @@ Outcome compare(DeviceTracer& tracer, const ExactCase& c, uint64_t count) {
                           hit, int(g.instance), int(g.geometry), int(g.primitive), g.t);
             out.first = text;
         }
-        if (same && e) out.worst_t = std::max(out.worst_t, ulps(g.t, e->t));
+        if (same && e && !denormal && e->t > std::numeric_limits<float>::min()) out.worst_t = std::max(out.worst_t, ulps(g.t, e->t));
     }
     return out;
 }
@@ -84,16 +88,15 @@ TEST_P(Exact, AgreesWithExactArithmeticOnEveryAxis) {
     options.step_budget = 7000;
     options.pause = true;
     DeviceTracer tracer(test_context(), options);
-    uint64_t hits = 0, ties = 0, edges = 0;
+    uint64_t hits = 0, excused = 0, ties = 0, edges = 0;
     for (const std::string& axis : exact_axis_names()) {
         for (const ExactCase& c : exact_cases(axis)) {
             const Outcome out = compare(tracer, c, kRays);
-            // Where denormals are at stake a device that flushes them (lavapipe 22.3) computes with other
-            // numbers; it must only come to an end.
-            if (!c.denormal) {
-                EXPECT_EQ(out.different, 0u) << axis << ' ' << c.value << ": " << out.first;
-                EXPECT_LE(out.worst_t, 1.0) << axis << ' ' << c.value;
-            }
+            // A ray in which denormals are at stake may differ on a device that flushes them (lavapipe 22.3), and
+            // only such a ray.
+            EXPECT_EQ(out.different, 0u) << axis << ' ' << c.value << ": " << out.first;
+            EXPECT_LE(out.worst_t, 1.0) << axis << ' ' << c.value;
+            excused += out.excused;
             hits += out.hits;
             ties += out.ties;
             edges += out.edges;
@@ -103,6 +106,7 @@ TEST_P(Exact, AgreesWithExactArithmeticOnEveryAxis) {
     EXPECT_GT(hits, 100 * kRays / 4);
     EXPECT_GT(ties, 400u);
     EXPECT_GT(edges, 400u);
+    EXPECT_LT(excused, 4 * kRays) << "of the cases of denormal coordinates";
 }
 
 // Nothing suspends within a triangle, so lavapipe 22.3 needs a budget that leaves room for its longest decision.

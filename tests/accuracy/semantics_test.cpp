@@ -25,8 +25,15 @@ RayResult trace_one(const HostScene& scene, const Ray& ray, Variant variant = Va
     return tracer.trace({ray})[0];
 }
 
-class EachTier : public LabTest, public testing::WithParamInterface<Variant> {};
-INSTANTIATE_TEST_SUITE_P(Tiers, EachTier, testing::Values(Variant::Watertight, Variant::Fast),
+class EachTier : public LabTest, public testing::WithParamInterface<Variant> {
+  protected:
+    void SetUp() override {
+        if (DeviceTracer::needs_float64(GetParam()) && !test_context().features.shaderFloat64)
+            GTEST_SKIP() << "the device has no Float64";
+    }
+};
+INSTANTIATE_TEST_SUITE_P(Tiers, EachTier,
+                         testing::Values(Variant::Watertight, Variant::Fast, Variant::Exact, Variant::Exact64),
                          [](const auto& info) { return variant_name(info.param); });
 
 TEST_P(EachTier, ReportsEverythingAboutAHit) {
@@ -90,7 +97,7 @@ TEST_P(EachTier, BoxIntervalIsClosedAndInsideHits) {
     EXPECT_EQ(seen(make_ray({0.5f, 0.5f, 3}, {0, 0, -1}, 4.1f, 9)), 0u);
     EXPECT_EQ(seen(make_ray({0.5f, 0.5f, 0}, {0, 0, -1}, 0, 0)), 1u) << "inside, empty interval";
     EXPECT_EQ(seen(make_ray({0.5f, 0.5f, 0}, {0, 0, -1}, 0.1f, 0.2f)), 1u) << "wholly inside";
-    if (GetParam() == Variant::Watertight) {
+    if (GetParam() != Variant::Fast) {
         EXPECT_EQ(seen(make_ray({1, 0.5f, 3}, {0, 0, -1})), 1u) << "along a face";
         EXPECT_EQ(seen(make_ray({1, 1, 3}, {0, -0.0f, -1})), 1u) << "along an edge, with -0";
     }
@@ -287,6 +294,109 @@ TEST_P(EachTier, DegenerateTrianglesAndEmptyStructures) {
     Instance flat;
     flat.object_to_world[0][0] = 0;
     EXPECT_EQ(trace_one(build_scene({triangle_blas()}, {flat}), ray, GetParam()).instance, kNoInstance);
+}
+
+// t in the ray's own units may lie outside the range of floats, or round to an end of the interval.
+TEST_P(EachTier, DistanceStaysWithinTheInterval) {
+    DeviceTracer& tracer = shared_tracer(GetParam());
+    for (const bool opaque : {true, false}) {  // shaders are told t by two ways
+        tracer.set_scene(build_scene({triangle_blas(opaque)}, {{}}));
+        // t = 2^-168 and 2^-130 and 2^130: what a device can hold of it is its own affair.
+        const Ray small = make_ray({0.25f, 0.25f, 0x1p-50f}, {0, 0, -0x1p118f}, 0, kInf);
+        const Ray denormal = make_ray({0.25f, 0.25f, 0x1p-12f}, {0, 0, -0x1p118f}, 0, kInf);
+        const Ray large = make_ray({0.25f, 0.25f, 0x1p20f}, {0, 0, -0x1p-110f}, 0, kInf);
+        const auto results = tracer.trace({small, denormal, large});
+        for (const RayResult& r : results) EXPECT_EQ(r.instance, 0u);
+        EXPECT_GT(std::bit_cast<uint32_t>(results[0].t), 0u) << "0 < t, denormal or not";
+        EXPECT_LE(results[0].t, 0x1p-126f);
+        EXPECT_GT(std::bit_cast<uint32_t>(results[1].t), 0u);
+        EXPECT_LE(results[1].t, 0x1p-126f);
+        EXPECT_EQ(results[2].t, std::numeric_limits<float>::max());
+    }
+}
+
+// What is hit between two neighbouring floats is told as lying inside the interval where there is room.
+TEST_F(LabTest, ExactDistancesDoNotTouchTheEnds) {
+    for (const Variant variant : {Variant::Exact, Variant::Exact64}) {
+        if (DeviceTracer::needs_float64(variant) && !test_context().features.shaderFloat64) continue;
+        DeviceTracer& tracer = shared_tracer(variant);
+        tracer.set_scene(build_scene({triangle_blas()}, {{}}));
+        const float nearest = float(1.0 / 3), above = std::nextafter(nearest, 1.0f), below = std::nextafter(nearest, 0.0f);
+        ASSERT_GT(double(nearest), 1.0 / 3);
+        auto t = [&](float tmin, float tmax) {
+            const RayResult r = tracer.trace({make_ray({0.25f, 0.25f, 1}, {0, 0, -3}, tmin, tmax)})[0];
+            return r.instance == 0 ? r.t : -1.0f;
+        };
+        EXPECT_EQ(t(0, 1), nearest);
+        EXPECT_EQ(t(0, nearest), below) << "the exact t is below tmax, what it rounds to is tmax";
+        EXPECT_EQ(t(below, above), nearest);
+        EXPECT_EQ(t(below, nearest), nearest) << "no float between: tmax";
+        EXPECT_EQ(t(nearest, 1), -1.0f) << "the exact t is below tmin";
+    }
+}
+
+// Coordinates, transforms and rays of any bits: a miss or a hit of something that is there, in bounded time.
+TEST_P(EachTier, GarbageEndsAndNamesWhatIsThere) {
+    std::mt19937_64 random(11);
+    const float special[] = {kNan, kInf, -kInf, 0.0f, -0.0f, 1e38f, -3e38f, 1e-40f, 1, -1};
+    auto any = [&] {
+        const uint64_t kind = random() % 4;
+        if (kind == 0) return std::bit_cast<float>(uint32_t(random()));
+        if (kind == 1) return special[random() % std::size(special)];
+        return float(int(random() % 2001) - 1000) / 500;
+    };
+    DeviceTracer& tracer = shared_tracer(GetParam());
+    uint32_t hits = 0;
+    // Infinite boxes hide much (this builder looks at x only for NaN): vertices and transforms are finite first.
+    for (const bool finite : {true, false}) {
+        auto number = [&] {
+            float v = any();
+            while (finite && !std::isfinite(v)) v = any();
+            return v;
+        };
+        Blas blas;
+        blas.geometries.resize(2);
+        for (int i = 0; i < 120; ++i) {
+            Triangle t;
+            for (Vec3& v : t) v = {number(), number(), number()};
+            blas.geometries[i % 2].triangles.push_back(t);
+        }
+        std::vector<Instance> instances(finite ? 2 : 6);
+        if (finite) instances[1].object_to_world = {{{0, -2, 0, 1e-30f}, {1e-10f, 0, 0, 0}, {0, 0, 1e10f, 3}}};
+        for (size_t i = 1; i < instances.size() && !finite; ++i)
+            for (auto& row : instances[i].object_to_world)
+                for (float& m : row) m = any();
+        tracer.set_scene(build_scene({blas}, instances));
+        std::vector<Ray> rays;
+        for (int i = 0; i < 512; ++i) {
+            Ray ray = make_ray({number(), number(), number()}, {number(), number(), number()}, 0, kInf);
+            if (i % 4 == 0) ray.tmin = any();
+            if (i % 4 == 1) ray.tmax = any();
+            rays.push_back(ray);
+        }
+        uint32_t most = 0;
+        const auto results = tracer.trace(rays);
+        for (size_t i = 0; i < rays.size(); ++i) {
+            const RayResult& r = results[i];
+            most = std::max(most, r.turns);
+            if (r.instance == kNoInstance) continue;
+            ++hits;
+            EXPECT_LT(r.instance, instances.size());
+            EXPECT_LT(r.geometry, 2u);
+            EXPECT_LT(r.primitive, 60u);
+            EXPECT_TRUE(std::isfinite(r.t)) << i;
+            EXPECT_GT(std::bit_cast<uint32_t>(r.t) & 0x7fffffffu, 0u) << i;
+            EXPECT_GE(r.t, std::max(rays[i].tmin, 0.0f)) << i;
+            if (rays[i].tmax > 0x1p-126f) {
+                EXPECT_LE(r.t, rays[i].tmax) << i;
+            }
+        }
+        // Each triangle once in each instance, each with the longest decision; the walk takes a few turns a node.
+        const bool decides = GetParam() == Variant::Exact || GetParam() == Variant::Exact64;
+        EXPECT_LT(most, 120 * instances.size() * (decides ? 5400u : 16u));
+        EXPECT_EQ(tracer.error, RTC_LAUNCH_ERROR_NONE);
+    }
+    EXPECT_GT(hits, 20u) << "this test sees nothing";
 }
 
 TEST_F(LabTest, DirectionLengthDoesNotMatter) {

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "cases.h"
+#include "denormals.h"
 #include "exact.h"
 
 namespace rtc::lab {
@@ -112,14 +113,6 @@ struct Errors {
     FineHistogram weights;
 };
 
-// One coordinate in 1e5 of size 1e-33 is a denormal.
-bool has_denormal(const Ray& ray) {
-    for (const Vec3& v : {ray.origin, ray.direction})
-        for (int i = 0; i < 3; ++i)
-            if (v[i] != 0 && std::fabs(v[i]) < std::numeric_limits<float>::min()) return true;
-    return false;
-}
-
 // Whether a triangle that only the device hits is touched at an edge or vertex: there a rule decides.
 bool touches_edge(const HostScene& scene, const Ray& ray, const RayResult& hit) {
     const Instance& instance = scene.instances.at(hit.instance);
@@ -139,8 +132,9 @@ void compare(const ExactCase& c, const HostScene& scene, const std::vector<Ray>&
         row.hits += e.has_value();
         row.ties += e && e->tied;
         row.on_edge += e && e->on_edge;
+        const bool denormal = denormals_at_stake(scene, rays[i], e, g);
+        row.with_denormals += denormal;
         if (!e && !hit) continue;
-        const bool denormal = c.denormal || has_denormal(rays[i]);
         if (e && hit && g.instance == e->instance && g.geometry == e->geometry && g.primitive == e->primitive) {
             if (denormal || std::fabs(e->t) < std::numeric_limits<float>::min()) continue;  // a t that devices flush
             const double error = std::fabs(double(g.t) - e->t) / ulp(e->t);
@@ -182,8 +176,11 @@ void compare(const ExactCase& c, const HostScene& scene, const std::vector<Ray>&
 void measure_case(RayTracer& tracer, const ExactCase& c, uint64_t share, double allowed, unsigned threads,
                   AgreementRow& row, Errors& errors) {
     const Clock::time_point start = Clock::now();
-    const HostScene scene = build_scene(c.blases, c.instances, c.build);
+    HostScene scene = build_scene(c.blases, c.instances, c.build);
     tracer.set_scene(scene);
+    // The oracle keeps its own trees, and takes instances one by one; only the object-space rays are the tracer's.
+    for (uint32_t i = 0; i < scene.instances.size(); ++i)
+        if (const auto inverse = tracer.world_to_object(i)) scene.world_to_object[i] = *inverse;
     const Oracle oracle(scene);
     std::vector<Ray> rays;
     for (uint64_t first = 0; first < share; first += kBatch) {
@@ -222,6 +219,7 @@ void AgreementRow::add(const AgreementRow& more) {
     invented += more.invented;
     inverted += more.inverted;
     denormal += more.denormal;
+    with_denormals += more.with_denormals;
     by_rule += more.by_rule;
     missed_plainly += more.missed_plainly;
     invented_plainly += more.invented_plainly;

@@ -15,7 +15,8 @@ struct AgreementRow {
     uint64_t cases = 0, rays = 0, hits = 0;
     uint64_t missed = 0, invented = 0;  // hit by exact arithmetic only, by the device only
     uint64_t inverted = 0;              // another triangle than the first
-    uint64_t denormal = 0;              // of all differences: cases where denormals are at stake, rays that have some
+    uint64_t denormal = 0;              // of all differences: where denormals are at stake (denormals.h)
+    uint64_t with_denormals = 0;        // rays of which that is true, whether they differ or not
     uint64_t by_rule = 0;               // of the others: rays that tie or meet an edge exactly, which only a rule decides
     uint64_t missed_plainly = 0, invented_plainly = 0;  // but for denormals and rules
     uint64_t later = 0;                 // of `inverted`, but for the two above: the triangle hit lies beyond the first

@@ -7,25 +7,11 @@
 #include "../native/executor.h"
 #include "error.h"
 #include "job_descriptors.h"
+#include "rays_job.h"
 #include "resources.h"
 
 namespace rtc::lab {
 namespace {
-
-constexpr uint32_t kRaygen[] = {
-#include "rays_rgen.inc"
-};
-constexpr uint32_t kAnyHit[] = {
-#include "rays_rahit.inc"
-};
-constexpr uint32_t kClosestHit[] = {
-#include "rays_rchit.inc"
-};
-constexpr uint32_t kMiss[] = {
-#include "rays_rmiss.inc"
-};
-
-constexpr uint32_t kWidth = 1024;
 
 native::World world_of(const HostScene& scene) {
     native::World world;
@@ -57,27 +43,7 @@ native::World world_of(const HostScene& scene) {
 
 class NativeRays final : public RayTracer {
   public:
-    NativeRays(const tools::Context& context, bool any_hit) : context_(context) {
-        auto add = [&](tools::JobStage stage, const char* name, const auto& words) {
-            tools::JobShader shader;
-            shader.stage = stage;
-            shader.name = name;
-            shader.spirv.assign(std::begin(words), std::end(words));
-            pipeline_.shaders.push_back(shader);
-            return int(pipeline_.shaders.size() - 1);
-        };
-        pipeline_.groups.resize(3);
-        pipeline_.groups[0].name = "raygen";
-        pipeline_.groups[0].general = add(tools::JobStage::RayGen, "rgen", kRaygen);
-        pipeline_.groups[1].name = "miss";
-        pipeline_.groups[1].general = add(tools::JobStage::Miss, "rmiss", kMiss);
-        pipeline_.groups[2].name = "hit";
-        if (any_hit) pipeline_.groups[2].any_hit = add(tools::JobStage::AnyHit, "rahit", kAnyHit);
-        pipeline_.groups[2].closest_hit = add(tools::JobStage::ClosestHit, "rchit", kClosestHit);
-        table_.raygen.push_back({0, {}});
-        table_.miss.push_back({1, {}});
-        table_.hit.push_back({2, {}});
-    }
+    NativeRays(const tools::Context& context, bool any_hit) : context_(context), job_(rays_job(any_hit)) {}
 
     void set_scene(const HostScene& scene) override {
         descriptors_.reset();
@@ -87,7 +53,7 @@ class NativeRays final : public RayTracer {
     }
 
     std::vector<RayResult> trace(const std::vector<Ray>& rays) override {
-        const uint32_t lanes = (uint32_t(rays.size()) + kWidth - 1) / kWidth * kWidth;
+        const uint32_t lanes = (uint32_t(rays.size()) + kRaysWidth - 1) / kRaysWidth * kRaysWidth;
         if (lanes > capacity_) {
             descriptors_.reset();
             const VkBufferUsageFlags in = VK_BUFFER_USAGE_TRANSFER_DST_BIT, out = VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
@@ -102,8 +68,8 @@ class NativeRays final : public RayTracer {
         std::memcpy(rays_here_.mapped, rays.data(), rays.size() * sizeof(Ray));
         const uint32_t push[2] = {0, uint32_t(rays.size())};
         native::Launch launch;
-        launch.width = kWidth;
-        launch.height = lanes / kWidth;
+        launch.width = kRaysWidth;
+        launch.height = lanes / kRaysWidth;
         launch.sets = descriptors_->sets;
         launch.push_constants.resize(sizeof push);
         std::memcpy(launch.push_constants.data(), push, sizeof push);
@@ -142,15 +108,14 @@ class NativeRays final : public RayTracer {
                 executor_->write_top(set, binding, element, 0);
             });
         if (fresh_) {
-            executor_->create_pipeline(pipeline_, descriptors_->layouts, 2 * sizeof(uint32_t));
-            executor_->set_tables(native::tables_of(table_));
+            executor_->create_pipeline(job_.pipeline, descriptors_->layouts, 2 * sizeof(uint32_t));
+            executor_->set_tables(native::tables_of(job_.table));
             fresh_ = false;
         }
     }
 
     const tools::Context& context_;
-    tools::JobPipeline pipeline_;
-    tools::JobTable table_;
+    tools::RayTracingJob job_;
     std::unique_ptr<native::Executor> executor_;
     std::unique_ptr<tools::JobDescriptors> descriptors_;
     tools::Buffer rays_, results_;            // on the device

@@ -39,14 +39,31 @@ class RtcDevice {
     std::unique_ptr<std::string> messages_;
 };
 
+struct RtcSceneOptions {
+    bool fast_build = false;
+    bool addresses = false;  // for modules of address mode; without, for those that read a heap
+    bool allow_update = false;
+};
+
 // A scene's acceleration structures, built on the device.
 class RtcScene {
   public:
-    // `addresses`: for modules of address mode; without, for those that read a heap.
+    // Geometries of a bottom level each: all triangles or all boxes.
+    using Bottoms = std::vector<std::vector<const Mesh*>>;
+
     RtcScene(const RtcDevice& device, const Scene& scene, bool fast_build = false, bool addresses = false);
+    // `mesh` of an instance is the number of its bottom level.
+    RtcScene(const RtcDevice& device, const Bottoms& bottoms, const std::vector<Instance>& instances,
+             const RtcSceneOptions& options);
     ~RtcScene();
     RtcScene(const RtcScene&) = delete;
     RtcScene& operator=(const RtcScene&) = delete;
+
+    // All levels updated in place: other vertices, boxes and transforms, as many as there were. Needs allow_update.
+    void update(const Bottoms& bottoms, const std::vector<Instance>& instances);
+
+    // The top level as it lies in memory, in abi.h's layout.
+    std::vector<uint32_t> top_words() const;
 
     RtrHeap heap = nullptr;  // null in address mode
     RtrAccelerationStructure top = nullptr;
@@ -55,8 +72,12 @@ class RtcScene {
     VkDeviceSize bytes = 0;    // of all structures
 
   private:
+    void build(const Bottoms& bottoms, const std::vector<Instance>& instances, bool update);
+
     const RtcDevice& device_;
+    RtcSceneOptions options_;
     Buffer memory_;
+    VkDeviceSize top_offset_ = 0, top_size_ = 0;
     std::vector<RtrAccelerationStructure> bottoms_;
 };
 

@@ -75,72 +75,111 @@ VkAccelerationStructureInstanceNV convert(const Instance& instance, uint64_t ref
     return converted;
 }
 
+VkAccelerationStructureInfoNV info_of(const RtcSceneOptions& options, VkAccelerationStructureTypeNV type) {
+    VkAccelerationStructureInfoNV info{};
+    info.sType = VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV;
+    info.type = type;
+    info.flags = options.fast_build ? VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_BUILD_BIT_NV
+                                    : VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_TRACE_BIT_NV;
+    if (options.allow_update) info.flags |= VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV;
+    return info;
+}
+
+// What all levels are built from. Infos point into the other members.
+struct Inputs {
+    Inputs(const Context& context, const RtcScene::Bottoms& bottoms, size_t instances, const RtcSceneOptions& options) {
+        for (const auto& bottom : bottoms) {
+            std::vector<VkGeometryNV>& list = geometries.emplace_back();
+            for (const Mesh* mesh : bottom) {
+                buffers.push_back(upload_mesh(context, *mesh));
+                list.push_back(buffers.back().geometry);
+            }
+        }
+        for (const auto& list : geometries) {
+            VkAccelerationStructureInfoNV info = info_of(options, VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_NV);
+            info.geometryCount = uint32_t(list.size());
+            info.pGeometries = list.data();
+            infos.push_back(info);
+        }
+        infos.push_back(info_of(options, VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV));
+        infos.back().instanceCount = uint32_t(instances);
+    }
+
+    std::vector<BottomInput> buffers;
+    std::vector<std::vector<VkGeometryNV>> geometries;
+    std::vector<VkAccelerationStructureInfoNV> infos;  // the top level's is the last
+};
+
+RtcScene::Bottoms bottoms_of(const Scene& scene) {
+    RtcScene::Bottoms bottoms;
+    for (const Mesh& mesh : scene.meshes) bottoms.push_back({&mesh});
+    return bottoms;
+}
+
 }  // namespace
 
 RtcScene::RtcScene(const RtcDevice& device, const Scene& scene, bool fast_build, bool addresses)
-    : device_(device) {
-    const auto start = std::chrono::steady_clock::now();
-    const Context& context = device.context;
-    const VkBuildAccelerationStructureFlagsNV flags =
-        fast_build ? VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_BUILD_BIT_NV
-                   : VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_TRACE_BIT_NV;
+    : RtcScene(device, bottoms_of(scene), scene.instances, {fast_build, addresses, false}) {}
 
-    std::vector<BottomInput> inputs;
-    std::vector<VkAccelerationStructureInfoNV> infos;
-    auto create = [&](const VkAccelerationStructureInfoNV& info) {
+RtcScene::RtcScene(const RtcDevice& device, const Bottoms& bottoms, const std::vector<Instance>& instances,
+                   const RtcSceneOptions& options)
+    : device_(device), options_(options) {
+    build(bottoms, instances, false);
+}
+
+void RtcScene::update(const Bottoms& bottoms, const std::vector<Instance>& instances) { build(bottoms, instances, true); }
+
+void RtcScene::build(const Bottoms& bottoms, const std::vector<Instance>& instances, bool update) {
+    const auto start = std::chrono::steady_clock::now();
+    const RtcDevice& device = device_;
+    const Context& context = device.context;
+    const Inputs inputs(context, bottoms, instances.size(), options_);
+    std::vector<RtrAccelerationStructure> all;
+    if (update) {
+        all = bottoms_;
+        all.push_back(top);
+    }
+    for (const VkAccelerationStructureInfoNV& info : inputs.infos) {
+        if (update) break;
         VkAccelerationStructureCreateInfoNV createInfo{};
         createInfo.sType = VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_CREATE_INFO_NV;
         createInfo.info = info;
         RtrAccelerationStructure structure = nullptr;
         device.check(rtrCreateAccelerationStructure(device.handle, &createInfo, nullptr, &structure),
                      "rtrCreateAccelerationStructure");
-        return structure;
-    };
-    VkAccelerationStructureInfoNV info{};
-    info.sType = VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV;
-    info.flags = flags;
-
-    inputs.reserve(scene.meshes.size());  // infos point into it
-    for (const Mesh& mesh : scene.meshes) {
-        inputs.push_back(upload_mesh(context, mesh));
-        info.type = VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_NV;
-        info.geometryCount = 1;
-        info.pGeometries = &inputs.back().geometry;
-        infos.push_back(info);
-        bottoms_.push_back(create(info));
+        all.push_back(structure);
+        if (info.type == VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV) {
+            top = structure;
+        } else {
+            bottoms_.push_back(structure);
+        }
     }
-    info.type = VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV;
-    info.geometryCount = 0;
-    info.pGeometries = nullptr;
-    info.instanceCount = uint32_t(scene.instances.size());
-    infos.push_back(info);
-    top = create(info);
-
-    std::vector<RtrAccelerationStructure> all = bottoms_;
-    all.push_back(top);
     VkDeviceSize scratch_size = 0;
     std::vector<VkDeviceSize> sizes;
     for (RtrAccelerationStructure structure : all) {
+        const auto scratch = update ? VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_UPDATE_SCRATCH_NV
+                                    : VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_BUILD_SCRATCH_NV;
         sizes.push_back(requirement(device.handle, structure,
                                     VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_OBJECT_NV));
-        bytes += sizes.back();
-        scratch_size = std::max(
-            scratch_size, requirement(device.handle, structure,
-                                      VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_BUILD_SCRATCH_NV));
+        scratch_size = std::max({scratch_size, kAlign, requirement(device.handle, structure, scratch)});
+        if (!update) bytes += sizes.back();
     }
-    const VkDeviceSize size = bytes + 2 * kAlign;
-    memory_ = Buffer(context, size, addresses ? RTR_ADDRESS_BUFFER_USAGE : RTR_HEAP_BUFFER_USAGE, MemoryKind::Device);
-    if (!addresses) {
-        RtrHeapCreateInfo heapInfo{};
-        heapInfo.buffer = memory_.handle;
-        heapInfo.size = size;
-        device.check(rtrCreateHeap(device.handle, &heapInfo, nullptr, &heap), "rtrCreateHeap");
+    if (!update) {
+        const VkDeviceSize size = bytes + 2 * kAlign;
+        memory_ = Buffer(context, size, options_.addresses ? RTR_ADDRESS_BUFFER_USAGE : RTR_HEAP_BUFFER_USAGE,
+                         MemoryKind::Device);
+        if (!options_.addresses) {
+            RtrHeapCreateInfo heapInfo{};
+            heapInfo.buffer = memory_.handle;
+            heapInfo.size = size;
+            device.check(rtrCreateHeap(device.handle, &heapInfo, nullptr, &heap), "rtrCreateHeap");
+        }
     }
     VkDeviceSize used = 0;
-    for (size_t i = 0; i < all.size(); ++i) {
+    for (size_t i = 0; i < all.size() && !update; ++i) {
         RtrBindAccelerationStructureMemoryInfo bind{};
         bind.accelerationStructure = all[i];
-        if (addresses) {
+        if (options_.addresses) {
             bind.buffer = memory_.handle;
             bind.bufferOffset = used;
             used += sizes[i];
@@ -150,17 +189,19 @@ RtcScene::RtcScene(const RtcDevice& device, const Scene& scene, bool fast_build,
         }
         device.check(rtrBindAccelerationStructureMemory(device.handle, 1, &bind),
                      "rtrBindAccelerationStructureMemory");
+        top_offset_ = options_.addresses ? bind.bufferOffset : bind.heapOffset;
+        top_size_ = sizes[i];
     }
 
-    std::vector<VkAccelerationStructureInstanceNV> instances;
-    for (const Instance& instance : scene.instances) {
+    std::vector<VkAccelerationStructureInstanceNV> converted;
+    for (const Instance& instance : instances) {
         uint64_t reference = 0;
         device.check(rtrGetAccelerationStructureHandle(device.handle, bottoms_[instance.mesh],
                                                        sizeof reference, &reference),
                      "rtrGetAccelerationStructureHandle");
-        instances.push_back(convert(instance, reference));
+        converted.push_back(convert(instance, reference));
     }
-    Buffer instance_buffer = upload_vector(context, instances, RTR_INPUT_BUFFER_USAGE);
+    Buffer instance_buffer = upload_vector(context, converted, RTR_INPUT_BUFFER_USAGE);
     Buffer scratch(context, scratch_size, RTR_SCRATCH_BUFFER_USAGE, MemoryKind::Device);
 
     RtrRecorderCreateInfo recorderInfo{};
@@ -168,12 +209,12 @@ RtcScene::RtcScene(const RtcDevice& device, const Scene& scene, bool fast_build,
     device.check(rtrCreateRecorder(device.handle, &recorderInfo, nullptr, &recorder), "rtrCreateRecorder");
     context.run([&](VkCommandBuffer commands) {
         device.check(rtrBeginRecorder(recorder, commands), "rtrBeginRecorder");
-        if (heap) device.check(rtrCmdInitializeHeap(recorder, heap), "rtrCmdInitializeHeap");
+        if (heap && !update) device.check(rtrCmdInitializeHeap(recorder, heap), "rtrCmdInitializeHeap");
         for (size_t i = 0; i < all.size(); ++i) {
             const bool is_top = i + 1 == all.size();
-            device.check(rtrCmdBuildAccelerationStructure(recorder, &infos[i],
-                                                          is_top ? instance_buffer.handle : VK_NULL_HANDLE, 0,
-                                                          VK_FALSE, all[i], nullptr, scratch.handle, 0),
+            device.check(rtrCmdBuildAccelerationStructure(recorder, &inputs.infos[i],
+                                                          is_top ? instance_buffer.handle : VK_NULL_HANDLE, 0, update,
+                                                          all[i], update ? all[i] : nullptr, scratch.handle, 0),
                          "rtrCmdBuildAccelerationStructure");
             full_barrier(commands);  // the scratch is shared, and the top level reads the others
         }
@@ -194,6 +235,18 @@ VkDescriptorBufferInfo RtcScene::descriptor() const {
     device_.check(rtrGetAccelerationStructureDescriptor(device_.handle, top, &info),
                   "rtrGetAccelerationStructureDescriptor");
     return info;
+}
+
+std::vector<uint32_t> RtcScene::top_words() const {
+    const Buffer read(device_.context, top_size_, VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryKind::Readback);
+    device_.context.run([&](VkCommandBuffer commands) {
+        const VkBufferCopy copy{top_offset_, 0, top_size_};
+        vkCmdCopyBuffer(commands, memory_.handle, read.handle, 1, &copy);
+        full_barrier(commands);
+    });
+    std::vector<uint32_t> words(top_size_ / sizeof(uint32_t));
+    std::memcpy(words.data(), read.mapped, words.size() * sizeof(uint32_t));
+    return words;
 }
 
 }  // namespace rtc::tools

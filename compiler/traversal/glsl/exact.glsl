@@ -403,6 +403,15 @@ bool rtc_report_in_range(float t) {
     return t >= rtc_ray_tmin && t <= rtc_hit_t && (!tie || wins);
 }
 
+// As in range.glsl. The exact t lies strictly between tmin and tmax, but what it rounds to may be one of them: then its
+// neighbour inside is as near. (Where no float lies between the two it is tmax.)
+float rtc_hit_distance(float t) {
+    t *= rtc_t_down();
+    int bits = t > 0.0 ? floatBitsToInt(t) : 0x00800000;
+    int least = max(floatBitsToInt(rtc_ray_tmin), 0) + 1;
+    return intBitsToFloat(max(min(bits, floatBitsToInt(rtc_ray_tmax) - 1), least));
+}
+
 void rtc_accepted() {
     rtc_hit_slot = rtc_cand_slot;
     rtc_trav_low = rtc_trav_tmax;

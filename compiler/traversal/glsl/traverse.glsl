@@ -146,7 +146,7 @@ uint rtc_record_index(uint instance, uint geometry) {
 void rtc_hit_unpack() {
     // Reports are compared with rtc_hit_t meanwhile, so that with AABBs it is kept.
     if (!RTC_LINK_AABBS) {
-        rtc_hit_t = rtc_trav_tmax * rtc_t_down();
+        rtc_hit_t = rtc_hit_distance(rtc_trav_tmax);
     }
     rtc_hit_kind = rtc_hit_packed >> 24u;
     rtc_hit_geometry = rtc_hit_packed & RTC_SLOT_GEOMETRY_MASK;
@@ -225,13 +225,13 @@ uint rtc_meet_triangle(uint slot, uint primitive, uint flags, float t, float b1,
                 rtc_cand_attr7 = 0u;
             }
             if (RTC_LINK_ANY_HIT && opacity == 0u) {
-                rtc_cand_t = t * rtc_t_down();
+                rtc_cand_t = rtc_hit_distance(t);
                 rtc_cand_record = rtc_record_index(rtc_cand_instance, rtc_cand_geometry);
                 result = RTC_STEP_TRIANGLE;
             } else {
                 rtc_trav_tmax = t;
                 if (RTC_LINK_AABBS) {
-                    rtc_hit_t = t * rtc_t_down();
+                    rtc_hit_t = rtc_hit_distance(t);
                 }
                 rtc_commit();
             }

@@ -20,8 +20,6 @@ struct ExactCase {
     // Rays `first` to `first + count` of this case: the same whatever the batches.
     std::function<std::vector<Ray>(uint64_t first, uint64_t count)> rays;
     BuildOptions build;
-    // Coordinates or directions below 2^-126 are at stake: devices that flush them may differ.
-    bool denormal = false;
 };
 
 // `ordinary` is no part of these: it is for what most rays are.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "host_scene.h"
@@ -45,6 +46,8 @@ class RayTracer {
     virtual void set_scene(const HostScene& scene) = 0;
     // One result a ray, in their order. Members that a tracer does not know are 0.
     virtual std::vector<RayResult> trace(const std::vector<Ray>& rays) = 0;
+    // World to object of an instance, where the tracer's own builder computed it; else it is the HostScene's.
+    virtual std::optional<Transform> world_to_object(uint32_t) const { return {}; }
     // Of the scene's structures, all levels, 0: not known.
     virtual uint64_t scene_bytes() const = 0;
 
