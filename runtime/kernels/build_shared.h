@@ -34,6 +34,11 @@
 #define RTR_ARR_DST_HEADER 12u
 #define RTR_ARR_COUNT 13u
 
+/* LINKS of an update: parent << RTR_LINK_SHIFT, and: */
+#define RTR_LINK_SHIFT 2u
+#define RTR_LINK_TWO 2u   /* it has two inner children */
+#define RTR_LINK_RIGHT 1u /* this is its second child */
+
 /* Children of INFO: RTR_CHILD_LEAF | primitive, or an inner node. */
 #define RTR_CHILD_LEAF 0x80000000u
 #define RTR_COLLAPSED 0x80000000u

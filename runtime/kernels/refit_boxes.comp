@@ -28,22 +28,27 @@ void main() {
         if (i == 0u) refuse_update();
         return;
     }
-    if (i < dst_header[RTC_HDR_NODE_COUNT]) node = i;
+    uint children = 0u; // of `node`, inner ones
+    if (i < dst_header[RTC_HDR_NODE_COUNT]) {
+        node = i;
+        children = (inner(pairs_a[i].x) ? 1u : 0u) + (inner(pairs_a[i].y) ? 1u : 0u);
+    }
     for (uint turn = 0u; turn < 64u && node != 0xffffffffu; turn++) {
-        uvec2 refs = pairs_a[node];
-        uint wanted = (inner(refs.x) ? 1u : 0u) + (inner(refs.y) ? 1u : 0u);
-        device_fence();
-        uint arrived = atomicAdd(marks[node], 1u);
-        device_fence();
         uint next = 0xffffffffu;
-        if (arrived == wanted) {
+        if (children == 0u || last_arrival(node, children)) {
+            uvec2 refs = pairs_a[node];
             vec3 lo = vec3(RTR_FLT_MAX), hi = vec3(-RTR_FLT_MAX);
             add_child(refs.x, lo, hi);
             add_child(refs.y, lo, hi);
             node_box[2u * node] = vec4(lo, 0.0);
             node_box[2u * node + 1u] = vec4(hi, 0.0);
-            next = links[node];
-            if (next == 0xffffffffu) finish_header(lo, hi);
+            uint link = links[node];
+            if (link != 0xffffffffu) {
+                next = link >> RTR_LINK_SHIFT;
+                children = link_children(link);
+            } else {
+                finish_header(lo, hi);
+            }
         }
         node = next;
     }

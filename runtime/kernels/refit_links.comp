@@ -1,6 +1,6 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// Update, first part: parents of the encoded nodes, arrival counters, empty leaf boxes; and the state words
+// Update, first part: parents of the encoded nodes (RTR_LINK_*), arrival counters, empty leaf boxes; and the state words
 // (RTR_REFIT_INIT), where nothing needed them before. Nodes are seen through a window of p.window_count from
 // p.window_first on. Where there are several (RTR_REFIT_WINDOWS) pairs_a keeps the children for refit_boxes.
 #include "common.glsl"
@@ -19,10 +19,12 @@ void main() {
     }
     uint node = p.window_first + i;
     if (i >= p.window_count || node >= count) return;
-    marks[node] = 0u;
     if (node == 0u) links[0] = 0xffffffffu;
     uint left = dst_nodes[4u * i].w, right = dst_nodes[4u * i + 1u].w;
-    if ((left & RTC_REF_LEAF) == 0u) links[left] = node;
-    if ((right & RTC_REF_LEAF) == 0u) links[right] = node;
+    bool left_inner = (left & RTC_REF_LEAF) == 0u, right_inner = (right & RTC_REF_LEAF) == 0u;
+    uint link = node << RTR_LINK_SHIFT | (left_inner && right_inner ? RTR_LINK_TWO : 0u);
+    if (left_inner) links[left] = link;
+    if (right_inner) links[right] = link | RTR_LINK_RIGHT;
+    marks[node] = 0u;
     if ((p.flags & RTR_REFIT_WINDOWS) != 0u) pairs_a[node] = uvec2(left, right);
 }

@@ -22,34 +22,38 @@ void main() {
         if (i == 0u) refuse_update();
         return;
     }
+    uint children = 0u; // of `node`, inner ones
     if (i < dst_header[RTC_HDR_NODE_COUNT]) {
         uint left = dst_nodes[4u * i].w, right = dst_nodes[4u * i + 1u].w;
-        if ((left & RTC_REF_LEAF) != 0u) leaf_child(i, 0u, left);
-        if ((right & RTC_REF_LEAF) != 0u) leaf_child(i, 1u, right);
+        bool left_leaf = (left & RTC_REF_LEAF) != 0u, right_leaf = (right & RTC_REF_LEAF) != 0u;
+        if (left_leaf) leaf_child(i, 0u, left);
+        if (right_leaf) leaf_child(i, 1u, right);
         node = i;
+        children = (left_leaf ? 0u : 1u) + (right_leaf ? 0u : 1u);
     }
+    // GPUs wait for memory at each turn, a tree's height times: so nothing is read before the count that could be
+    // read after it, all at once.
     for (uint turn = 0u; turn < 64u && node != 0xffffffffu; turn++) {
-        uint left = dst_nodes[4u * node].w, right = dst_nodes[4u * node + 1u].w;
-        uint wanted = ((left & RTC_REF_LEAF) == 0u ? 1u : 0u) + ((right & RTC_REF_LEAF) == 0u ? 1u : 0u);
-        device_fence();
-        uint arrived = atomicAdd(marks[node], 1u);
-        device_fence();
         uint next = 0xffffffffu;
-        if (arrived == wanted) {
-            vec3 lo = uintBitsToFloat(dst_nodes[4u * node].xyz), hi = uintBitsToFloat(dst_nodes[4u * node + 1u].xyz);
-            if (left == RTC_REF_EMPTY) {
+        if (children == 0u || last_arrival(node, children)) { // 0: nobody else comes here
+            uint link = links[node];
+            uvec4 q0 = dst_nodes[4u * node], q1 = dst_nodes[4u * node + 1u];
+            uvec4 q2 = dst_nodes[4u * node + 2u], q3 = dst_nodes[4u * node + 3u];
+            vec3 lo = uintBitsToFloat(q0.xyz), hi = uintBitsToFloat(q1.xyz);
+            if (q0.w == RTC_REF_EMPTY) {
                 lo = vec3(RTR_FLT_MAX);
                 hi = vec3(-RTR_FLT_MAX);
             }
-            if (right != RTC_REF_EMPTY) {
-                lo = min(lo, uintBitsToFloat(dst_nodes[4u * node + 2u].xyz));
-                hi = max(hi, uintBitsToFloat(dst_nodes[4u * node + 3u].xyz));
+            if (q1.w != RTC_REF_EMPTY) {
+                lo = min(lo, uintBitsToFloat(q2.xyz));
+                hi = max(hi, uintBitsToFloat(q3.xyz));
             }
-            next = links[node];
-            if (next != 0xffffffffu) {
-                uint side = dst_nodes[4u * next].w == node ? 0u : 1u;
-                dst_nodes[4u * next + 2u * side].xyz = floatBitsToUint(lo);
-                dst_nodes[4u * next + 2u * side + 1u].xyz = floatBitsToUint(hi);
+            if (link != 0xffffffffu) {
+                next = link >> RTR_LINK_SHIFT;
+                children = link_children(link);
+                uint at = 4u * next + 2u * (link & RTR_LINK_RIGHT);
+                dst_nodes[at].xyz = floatBitsToUint(lo);
+                dst_nodes[at + 1u].xyz = floatBitsToUint(hi);
             } else {
                 finish_header(lo, hi);
             }

@@ -1,6 +1,17 @@
 // Shared by the kernels of updates that go up the tree (refit_nodes.comp, refit_boxes.comp, refit_store.comp).
 #include "facts.glsl"
 
+// A node is finished by the last to arrive there: its own lane, which has seen to its leaves, and those that come up
+// from its inner children. A link says how many of these the parent has, so that nothing need be read for that.
+uint link_children(uint link) { return (link & RTR_LINK_TWO) != 0u ? 2u : 1u; }
+
+bool last_arrival(uint node, uint children) {
+    device_fence();
+    uint before = atomicAdd(marks[node], 1u);
+    device_fence();
+    return before == children;
+}
+
 // The box of a leaf's slots; false for an empty child.
 bool slots_box(uint ref, out vec3 lo, out vec3 hi) {
     uint count = (ref >> RTC_REF_COUNT_SHIFT) & RTC_REF_COUNT_MASK;
