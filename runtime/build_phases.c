@@ -201,7 +201,8 @@ static VkResult number(RtrBuild* b) {
     static const RtrKernel kernels[3] = {RTR_KERNEL_number_count, RTR_KERNEL_number_scan, RTR_KERNEL_number};
     const uint32_t step = b->phase++ - NUMBER_COUNT;
     b->push.blocks = rtr_groups(b->primitives, RTR_SCAN_BLOCK);
-    if (b->push.blocks == 1 && step < 2) return VK_SUCCESS;
+    b->push.step = b->push.blocks <= b->device->few_blocks;
+    if (b->push.step && step < 2) return VK_SUCCESS;
     return rtr_dispatch_whole(b, kernels[step], step == 1 ? 1 : b->push.blocks);
 }
 

@@ -135,6 +135,7 @@ VkResult rtrCreateDevice(const RtrDeviceCreateInfo* info, const VkAllocationCall
     d->vki.GetPhysicalDeviceProperties2(d->physical_device, &properties);
     d->limits = properties.properties.limits;
     /* Measured (docs/benchmarks.md): dispatches are dear on GPUs, lanes that wait for others on lavapipe. */
+    d->few_blocks = properties.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU ? 1 : RTR_SCAN_FEW;
     d->level_nodes = properties.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU ? RTR_GROUP : 100000;
     rtr_make_blob_version(&id, d->blob_version);
     if ((r = rtr_learn_features(d, info->pDeviceCreateInfo)) != VK_SUCCESS) {

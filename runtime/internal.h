@@ -161,6 +161,7 @@ struct RtrDevice_T {
     VkPipelineLayout kernel_layout;
     uint32_t level_nodes; /* levels of this many nodes are fitted in a dispatch each (build_phases.c) */
     atomic_uint heaps; /* created so far: their numbers */
+    uint32_t few_blocks; /* of numbering, that take one dispatch: where a barrier costs more than counting again */
     bool validation;
     /* With validation: the structures that are bound and not destroyed (live.c). */
     atomic_flag live_lock;

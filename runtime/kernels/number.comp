@@ -2,12 +2,28 @@
 #extension GL_GOOGLE_include_directive : require
 // Encoded index of each surviving inner node, in Morton order (the root gets 0), and the
 // slots of the leaves that hang on it. The sums of the blocks before come from number_count and
-// number_scan, unless there is only one block.
+// number_scan; where blocks are few (p.step 1) each workgroup finds them itself.
 #include "common.glsl"
 #include "survive.glsl"
 
 shared uint sums[256];
 shared uint slot_sums[256];
+shared uint nodes_before;
+shared uint slots_before;
+
+// Survivors of the blocks before, and the slots on them.
+void count_before(uint lane) {
+    uint nodes = 0u, slots = 0u;
+    for (uint node = lane; node < group_index() * RTR_SCAN_BLOCK; node += RTR_GROUP) {
+        if (!survives(node)) continue;
+        nodes++;
+        slots += own_slots(node);
+    }
+    if (nodes != 0u) {
+        atomicAdd(nodes_before, nodes);
+        atomicAdd(slots_before, slots);
+    }
+}
 
 // The primitives of a collapsed subtree, at most RTC_MAX_LEAF_SLOTS, from slot `at` on.
 void place_leaf(uint node, uint at) {
@@ -29,6 +45,12 @@ void place_leaf(uint node, uint at) {
 void main() {
     uint lane = gl_LocalInvocationIndex;
     uint first = group_index() * RTR_SCAN_BLOCK + lane * RTR_SCAN_ITEMS;
+    if (lane == 0u) {
+        nodes_before = 0u;
+        slots_before = 0u;
+    }
+    barrier();
+    if (p.step == 1u) count_before(lane);
     bool alive[RTR_SCAN_ITEMS];
     uint own = 0u, own_s = 0u;
     for (uint k = 0u; k < RTR_SCAN_ITEMS; k++) {
@@ -51,11 +73,13 @@ void main() {
     }
     if (group_index() >= p.blocks) return;
     uint at = sums[lane] - own, slot = slot_sums[lane] - own_s;
-    if (p.blocks > 1u) {
+    if (p.step != 1u) {
         at += state[RTR_ST_SUMS + group_index()];
         slot += state[RTR_ST_SUMS + p.blocks + group_index()];
-    } else if (lane == RTR_GROUP - 1u) {
-        state[RTR_ST_NODES] = sums[lane];
+    } else {
+        at += nodes_before;
+        slot += slots_before;
+        if (group_index() + 1u == p.blocks && lane == RTR_GROUP - 1u) state[RTR_ST_NODES] = nodes_before + sums[lane];
     }
     for (uint k = 0u; k < RTR_SCAN_ITEMS; k++) {
         uint node = first + k;
