@@ -75,7 +75,7 @@
 #define RTR_SORT_FUSED (64u * RTR_SORT_BLOCK) /* primitives up to which a dispatch a digit sorts (sort_fused.comp) */
 #define RTR_SCAN_ITEMS 8u
 #define RTR_SCAN_BLOCK (RTR_GROUP * RTR_SCAN_ITEMS)
-#define RTR_SCAN_FEW 8u /* blocks up to which nodes are numbered in one dispatch */
+#define RTR_SCAN_FEW 3u /* blocks up to which nodes are numbered in one dispatch; from 5 on that was slower on an H100 */
 
 #define RTR_INACTIVE_KEY 0x7fffffffu
 
