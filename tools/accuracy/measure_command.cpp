@@ -56,7 +56,7 @@ class Subject {
             first_hits_ = make_native_tracer(*context_, false);
             return;
         }
-        TracerOptions options;
+        TracerOptions& options = options_;
         options.variant = parse_variant(name_);
         if (DeviceTracer::needs_float64(options.variant) && !context_->features.shaderFloat64)
             throw tools::MissingFeature(name_ + " needs shaderFloat64");
@@ -64,20 +64,35 @@ class Subject {
         options.storage_fetch = settings.storage;
         options.shared_stack = settings.shared_stack;
         options.aabbs = false;
-        TracerOptions lean = options;  // as a pipeline without any-hit and intersection shaders would have it
-        lean.any_hit = lean.resumable = false;
-        cost_ = std::make_unique<DeviceTracer>(*context_, lean);
         // Lavapipe 22.3 ends loops of many turns.
         options.step_budget = 7000;
         options.pause = true;
-        counting_ = std::make_unique<DeviceTracer>(*context_, options);
-        options.any_hit = false;
-        first_hits_ = std::make_unique<DeviceTracer>(*context_, options);
     }
 
-    RayTracer& counting() { return *counting_; }
-    RayTracer& first_hits() { return first_hits_ ? *first_hits_ : *counting_; }
-    RayTracer& cost() { return cost_ ? *cost_ : first_hits(); }
+    // Made when they are wanted: each is a pipeline to compile.
+    RayTracer& counting() {
+        if (!counting_) counting_ = std::make_unique<DeviceTracer>(*context_, options_);
+        return *counting_;
+    }
+    RayTracer& first_hits() {
+        if (is_embree(name_)) return *counting_;
+        if (!first_hits_) {
+            TracerOptions options = options_;
+            options.any_hit = false;
+            first_hits_ = std::make_unique<DeviceTracer>(*context_, options);
+        }
+        return *first_hits_;
+    }
+    RayTracer& cost() {
+        if (is_embree(name_) || name_ == "native") return first_hits();
+        if (!cost_) {  // as a pipeline without any-hit and intersection shaders would have it
+            TracerOptions options = options_;
+            options.any_hit = options.resumable = options.pause = false;
+            options.step_budget = 0xffffffffu;
+            cost_ = std::make_unique<DeviceTracer>(*context_, options);
+        }
+        return *cost_;
+    }
     const tools::Context* context() const { return context_.get(); }
     const std::string& device() const { return device_; }
     bool by_cpu() const { return by_cpu_; }
@@ -85,6 +100,7 @@ class Subject {
   private:
     std::string name_, device_;
     std::unique_ptr<tools::Context> context_;
+    TracerOptions options_;
     std::unique_ptr<RayTracer> counting_, first_hits_, cost_;
     bool by_cpu_ = false;
 };
@@ -248,7 +264,9 @@ void measure(Subject& subject, Report& report, const Settings& settings, double 
     const bool own = report.subject != "native" && !is_embree(report.subject);
     if (settings.cull_rays && own) culls(affordable(settings.cull_rays, 256, 0.1 * seconds, culls));
     if (settings.first_hits) first_hits(affordable(settings.first_hits, 8192, 0.3 * seconds, first_hits));
-    if (settings.self_hits && subject.context() && !is_knob(report.subject))
+    const bool spawns = report.subject == "fast" || report.subject == "watertight" || report.subject == "exact" ||
+                        report.subject == "native";
+    if (settings.self_hits && subject.context() && spawns)
         report.self_hits = measure_self_hits(*subject.context(), report.subject, settings.self_hits, 0.15 * seconds);
 }
 
@@ -360,7 +378,7 @@ int measure_command(int argc, char** argv) {
     if (settings.cost_rays) {
         std::vector<CostSubject> costs;
         for (size_t i = 0; i < tiers.size(); ++i)
-            if (subjects[i]) costs.push_back({&subjects[i]->cost(), &reports[i], subjects[i]->by_cpu()});
+            if (subjects[i]) attempt(i, [&] { costs.push_back({&subjects[i]->cost(), &reports[i], subjects[i]->by_cpu()}); });
         measure_cost(costs, settings.cost_rays, settings.repeats);
         for (size_t i = 0; i < tiers.size(); ++i)
             if (subjects[i] && !reports[i].cost_problem.empty()) {
