@@ -121,7 +121,7 @@ uint32_t turns_reserved() {
 TEST(ExactTurns, LongestDecisionFitsWhatIsReserved) {
     const uint32_t reserved = turns_reserved();
     ASSERT_GT(reserved, 0u) << "the constant has another name";
-    EXPECT_LE(reserved + 1024, 6600u) << "what docs/resumable.md says of budgets";
+    EXPECT_LE(reserved + 1024, 6600u) << "what tools/rtc/report.cpp and docs/resumable.md say of budgets";
     TracerOptions options;
     options.variant = Variant::Exact;
     options.aabbs = options.any_hit = options.resumable = false;

@@ -29,6 +29,10 @@ std::string report_text(const rtcc_reflection& r, const std::string& module) {
            std::to_string(r.max_callable_depth) + ", " +
            (r.flags & RTC_MODULE_RESUMABLE ? "resumable" : "not resumable") + ", accuracy " +
            accuracy_name(r.accuracy) + "\n";
+    // traverse.glsl, RTC_TURNS_OF_A_TRIANGLE; exact_test.cpp holds the two together.
+    if (r.flags & RTC_MODULE_RESUMABLE && (r.accuracy == RTCC_ACCURACY_EXACT || r.accuracy == RTCC_ACCURACY_EXACT_FLOAT64))
+        out += "  step budgets below 6600 leave no room for this accuracy's longest decision, within which nothing suspends: a "
+               "driver that counts turns may end it without a word\n";
     out += "  stack " + std::to_string(r.stack_words * 4) + " bytes, scratch " +
            std::to_string(r.scratch_words * 4) + " bytes, payload " + std::to_string(r.payload_words * 4) +
            " bytes, hit attributes " + std::to_string(r.attribute_words * 4) + " bytes, callable data " +

@@ -88,6 +88,13 @@ TEST_F(Report, ReportNamesWhatIsSaved) {
     EXPECT_THAT(run.out, ::testing::ContainsRegex("again.rchit:8: trace, [1-9][0-9]* bytes: .*kept"));
 }
 
+TEST_F(Report, ReportSaysWhatExactWantsOfStepBudgets) {
+    EXPECT_THAT(rtc("camera.rgen sky.rmiss --accuracy=exact --report -o p.spv").out, HasSubstr("step budgets below 6600"));
+    EXPECT_THAT(rtc("camera.rgen sky.rmiss --accuracy=exact --no-resumable --report -o p.spv").out,
+                ::testing::Not(HasSubstr("step budgets")));
+    EXPECT_THAT(rtc("camera.rgen sky.rmiss --report -o p.spv").out, ::testing::Not(HasSubstr("step budgets")));
+}
+
 TEST_F(Report, ReportOfAFinishedModule) {
     ASSERT_EQ(rtc("camera.rgen sky.rmiss -o p.spv --report").status, 0);
     // All but the comparison with the pipeline linked another way, which a module does not know.
