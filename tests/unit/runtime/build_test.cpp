@@ -264,7 +264,7 @@ TEST_P(BuildTest, GeometryFields) {
     for (uint16_t i = 0; i < 300; i++) indices.push_back(static_cast<uint16_t>(299 - i));
     float transform[16] = {0, 0, 0, 0, 0, 2, 0, 10, -1, 0, 0, 20, 0, 0, 0.5f, 30};
     VkGeometryNV g0 = scene.triangles({});
-    auto& t = g0.geometry.triangles;
+    VkGeometryTrianglesNV& t = g0.geometry.triangles;
     t.vertexData = scene.upload(raw.data(), raw.size()).handle;
     t.vertexOffset = 8;
     t.vertexCount = 300;
@@ -435,20 +435,24 @@ TEST_P(BuildTest, Boxes) {
                          std::max(a.y, b.y), std::max(a.z, b.z)});
     }
     boxes[17][0] = std::nanf("");
-    auto as = scene.build_bottom({scene.aabbs(boxes, VK_GEOMETRY_OPAQUE_BIT_NV)}, flags());
-    TreeFacts facts;
-    check_structure(scene, as, facts);
-    const uint32_t* w = scene.words(as);
-    EXPECT_EQ(w[RTC_HDR_FACTS], RTC_FACT_AABBS | RTC_FACT_ALL_OPAQUE);
-    ASSERT_EQ(w[RTC_HDR_ACTIVE_COUNT], 199u);
-    const uint32_t* slots = w + 4 * w[RTC_HDR_SLOTS];
-    for (uint32_t s = 0; s < 199; s++) {
-        uint32_t prim = slots[8 * s + 3];
-        ASSERT_LT(prim, 200u);
-        EXPECT_NE(prim, 17u);
-        EXPECT_EQ(memcmp(slots + 8 * s, &boxes[prim][0], 12), 0);
-        EXPECT_EQ(memcmp(slots + 8 * s + 4, &boxes[prim][3], 12), 0);
-        EXPECT_EQ(slots[8 * s + 7], RTC_SLOT_OPAQUE);
+    // By themselves, and with other data before and between them.
+    for (const auto& [stride, offset] : {std::pair{24u, 0u}, {32u, 8u}, {40u, 16u}, {24u, 24u}, {72u, 0u}}) {
+        SCOPED_TRACE(stride);
+        auto as = scene.build_bottom({scene.aabbs(boxes, VK_GEOMETRY_OPAQUE_BIT_NV, stride, offset)}, flags());
+        TreeFacts facts;
+        check_structure(scene, as, facts);
+        const uint32_t* w = scene.words(as);
+        EXPECT_EQ(w[RTC_HDR_FACTS], RTC_FACT_AABBS | RTC_FACT_ALL_OPAQUE);
+        ASSERT_EQ(w[RTC_HDR_ACTIVE_COUNT], 199u);
+        const uint32_t* slots = w + 4 * w[RTC_HDR_SLOTS];
+        for (uint32_t s = 0; s < 199; s++) {
+            uint32_t prim = slots[8 * s + 3];
+            ASSERT_LT(prim, 200u);
+            EXPECT_NE(prim, 17u);
+            EXPECT_EQ(memcmp(slots + 8 * s, &boxes[prim][0], 12), 0);
+            EXPECT_EQ(memcmp(slots + 8 * s + 4, &boxes[prim][3], 12), 0);
+            EXPECT_EQ(slots[8 * s + 7], RTC_SLOT_OPAQUE);
+        }
     }
 }
 
@@ -461,7 +465,8 @@ TEST_P(BuildTest, Instances) {
     std::vector<VkAccelerationStructureInstanceNV> instances;
     for (uint32_t i = 0; i < 700; i++) {
         auto instance = scene.instance(i % 7 == 3 ? nullptr : i % 5 ? a : b);
-        for (auto& row : instance.transform.matrix)
+        VkTransformMatrixNV& transform = instance.transform;
+        for (auto& row : transform.matrix)
             for (float& m : row) m = u(rng) * (i % 3 ? 1 : 1000);
         for (int r = 0; r < 3; r++) instance.transform.matrix[r][3] *= i % 2 ? 1 : 1e4f;
         instance.instanceCustomIndex = i * 11;

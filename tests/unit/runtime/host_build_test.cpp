@@ -170,6 +170,10 @@ TEST_F(HostBuildTest, BoxesAndOddInput) {
     std::vector<std::array<float, 6>> boxes{{0, 0, 0, 1, 1, 1}, {nan, 0, 0, 1, 1, 1}, {3, 3, 3, 2, 2, 2}};
     for (int i = 0; i < 300; i++) boxes.push_back({float(i), 0, 0, i + 0.5f, 1, 3e38f});
     compare(scene, {scene.aabbs(boxes)}, {{nullptr, nullptr, nullptr, boxes.data()}});
+    for (const auto& [stride, offset] : {std::pair{32u, 8u}, {40u, 16u}, {24u, 48u}}) {
+        const std::vector<char> bytes = aabb_bytes(boxes, stride, offset);
+        compare(scene, {scene.aabbs(boxes, 0, stride, offset)}, {{nullptr, nullptr, nullptr, bytes.data()}});
+    }
     compare(scene, {}, {});
     for (size_t n : {1u, 2u, 3u, 4u, 5u}) {
         auto few = soup(n, 5);

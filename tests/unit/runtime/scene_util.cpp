@@ -59,7 +59,7 @@ VkGeometryNV Scene::triangles(const std::vector<Vec3>& vertices, const std::vect
     VkGeometryNV g{VK_STRUCTURE_TYPE_GEOMETRY_NV};
     g.geometryType = VK_GEOMETRY_TYPE_TRIANGLES_NV;
     g.flags = flags;
-    auto& t = g.geometry.triangles;
+    VkGeometryTrianglesNV& t = g.geometry.triangles;
     t.sType = VK_STRUCTURE_TYPE_GEOMETRY_TRIANGLES_NV;
     t.vertexData = upload(vertices.data(), vertices.size() * sizeof(Vec3)).handle;
     t.vertexCount = static_cast<uint32_t>(vertices.size());
@@ -75,16 +75,29 @@ VkGeometryNV Scene::triangles(const std::vector<Vec3>& vertices, const std::vect
     return g;
 }
 
-VkGeometryNV Scene::aabbs(const std::vector<std::array<float, 6>>& boxes, VkGeometryFlagsNV flags) {
+std::vector<char> aabb_bytes(const std::vector<std::array<float, 6>>& boxes, uint32_t stride, uint32_t offset) {
+    std::vector<char> bytes(offset + boxes.size() * stride + 8, '\xff');
+    for (size_t i = 0; i < boxes.size(); i++) {
+        const auto& b = boxes[i];
+        const VkAabbPositionsNV box{b[0], b[1], b[2], b[3], b[4], b[5]};
+        memcpy(&bytes[offset + i * stride], &box, sizeof box);
+    }
+    return bytes;
+}
+
+VkGeometryNV Scene::aabbs(const std::vector<std::array<float, 6>>& boxes, VkGeometryFlagsNV flags, uint32_t stride,
+                          uint32_t offset) {
+    const std::vector<char> bytes = aabb_bytes(boxes, stride, offset);
     VkGeometryNV g{VK_STRUCTURE_TYPE_GEOMETRY_NV};
     g.geometryType = VK_GEOMETRY_TYPE_AABBS_NV;
     g.flags = flags;
     g.geometry.triangles.sType = VK_STRUCTURE_TYPE_GEOMETRY_TRIANGLES_NV;
-    auto& b = g.geometry.aabbs;
+    VkGeometryAABBNV& b = g.geometry.aabbs;
     b.sType = VK_STRUCTURE_TYPE_GEOMETRY_AABB_NV;
-    b.aabbData = upload(boxes.data(), boxes.size() * 24).handle;
+    b.aabbData = upload(bytes.data(), bytes.size()).handle;
     b.numAABBs = static_cast<uint32_t>(boxes.size());
-    b.stride = 24;
+    b.stride = stride;
+    b.offset = offset;
     return g;
 }
 

@@ -11,6 +11,9 @@ struct Vec3 {
     float x, y, z;
 };
 
+// Boxes as a buffer holds them, with NaN before, between and behind.
+std::vector<char> aabb_bytes(const std::vector<std::array<float, 6>>& boxes, uint32_t stride, uint32_t offset);
+
 // A bottom or top level with the buffers it needs, kept alive by the Vulkan object.
 struct BuiltStructure {
     RtrAccelerationStructure as = nullptr;
@@ -27,7 +30,8 @@ class Scene {
 
     VkGeometryNV triangles(const std::vector<Vec3>& vertices, const std::vector<uint32_t>* indices = nullptr,
                            VkGeometryFlagsNV flags = 0);
-    VkGeometryNV aabbs(const std::vector<std::array<float, 6>>& boxes, VkGeometryFlagsNV flags = 0);
+    VkGeometryNV aabbs(const std::vector<std::array<float, 6>>& boxes, VkGeometryFlagsNV flags = 0, uint32_t stride = 24,
+                       uint32_t offset = 0);
     RtrAccelerationStructure create(const VkAccelerationStructureInfoNV& info, VkDeviceSize compacted = 0);
     // Create, bind, build, submit, wait.
     RtrAccelerationStructure build_bottom(const std::vector<VkGeometryNV>& geometries,
