@@ -77,6 +77,7 @@ VkResult rtrCmdCopyAccelerationStructure(RtrRecorder rec, RtrAccelerationStructu
     push.src_lo = (uint32_t)src->base;
     push.src_hi = (uint32_t)(src->base >> 32);
     push.step = compact;
+    push.slots_quad = (uint32_t)rtr_min_size(dst->size / RTC_QUAD_BYTES, 0xffffffffu);
     for (at = 0; at < quads; at += window) {
         push.window_first = at;
         push.window_count = quads - at < window ? quads - at : window;

@@ -48,7 +48,8 @@ TEST_P(CopyTest, CompactKeepsTheTree) {
         Scene scene(*vk, rtr, 4 << 20, GetParam());
         RtrAccelerationStructure as, leaf = nullptr;
         if (kind == 0) {
-            as = scene.build_bottom({scene.triangles(ball(3000, 1, 0.1f, 0.1f))});
+            as = scene.build_bottom({scene.triangles(ball(3000, 1, 0.1f, 0.1f))},
+                                    VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_COMPACTION_BIT_NV);
         } else if (kind == 1) {
             std::vector<std::array<float, 6>> boxes(500, {0, 0, 0, 1, 1, 1});
             as = scene.build_bottom({scene.aabbs(boxes)});
@@ -104,6 +105,39 @@ TEST_P(CopyTest, LowMemoryCompactsToLess) {
         EXPECT_LT(facts[1].nodes, facts[0].nodes);
         EXPECT_LT(static_cast<double>(sizes[1]), 0.95 * static_cast<double>(sizes[0]));
         EXPECT_EQ(facts[1].slots.size(), 5000u);
+    }
+}
+
+TEST_P(CopyTest, WhatDoesNotFitIsANullStructure) {
+    Scene scene(*vk, rtr, 4 << 20, GetParam());
+    auto as = scene.build_bottom({scene.triangles(ball(3000, 1, 0.1f, 0.1f))});
+    auto whole = scene.build_top(std::vector<VkAccelerationStructureInstanceNV>(77, scene.instance(as)));
+    VkAccelerationStructureInfoNV info{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV};
+    for (auto source : {as, whole}) {
+        info.type = source == as ? VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_NV
+                                 : VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_NV;
+        const VkDeviceSize size = compacted_size(scene, source);
+        // As large as asked for, and by as little less as memory requirements can tell.
+        auto fits = scene.create(info, size), small = scene.create(info, (size - 1) / 256 * 256),
+             tiny = scene.create(info, 256);
+        scene.run([&] {
+            for (auto dst : {fits, small, tiny}) {
+                EXPECT_EQ(rtrCmdCopyAccelerationStructure(scene.recorder, dst, source,
+                                                          VK_COPY_ACCELERATION_STRUCTURE_MODE_COMPACT_NV),
+                          VK_SUCCESS);
+                vk->compute_barrier();  // the heap is read whole
+            }
+        });
+        EXPECT_EQ(scene.words(fits)[RTC_HDR_MAGIC], RTC_AS_MAGIC);
+        for (auto dst : {small, tiny}) {
+            const uint32_t* w = scene.words(dst);
+            for (uint32_t i = 0; i < RTC_AS_HEADER_QUADS * 4; i++)
+                EXPECT_EQ(w[i], i == RTC_HDR_SIZE_QUADS ? size / RTC_QUAD_BYTES : 0u) << i;
+        }
+        if (source != as) continue;
+        auto top = scene.build_top({scene.instance(fits), scene.instance(small)});
+        EXPECT_EQ(scene.words(top)[RTC_HDR_ACTIVE_COUNT], 1u);
+        EXPECT_EQ(scene.words(top)[RTC_HDR_BAD_INSTANCE], 1u + 1);
     }
 }
 
@@ -169,7 +203,7 @@ TEST_P(CopyTest, RefitOfInstancesAndBoxes) {
     auto top = scene.build_top(instances, flags);
     for (auto& b : boxes) b[2] -= 10, b[4] += 3;
     std::reverse(boxes.begin(), boxes.end());
-    VkGeometryNV geometry = scene.aabbs(boxes);
+    VkGeometryNV geometry = scene.aabbs(boxes, 0, 40, 16);  // an update may lie otherwise
     for (int i = 0; i < 50; i++) instances[static_cast<size_t>(i)].transform.matrix[0][3] = -3.0f * i;
     instances[9].mask = 1;
     Buffer data = scene.upload(instances.data(), instances.size() * sizeof instances[0]);
