@@ -49,7 +49,7 @@ bool rtr_vertex_format(VkFormat format, uint32_t* code, uint32_t* bytes, uint32_
 static VkResult check_triangles(RtrDevice d, const VkGeometryTrianglesNV* t, unsigned g,
                                 uint32_t* primitives) {
     uint32_t code, bytes, component;
-    VkResult r = rtr_check_chain(d, "VkGeometryTrianglesNV", t->pNext);
+    VkResult r = rtr_check_structure(d, "VkGeometryTrianglesNV", t, VK_STRUCTURE_TYPE_GEOMETRY_TRIANGLES_NV);
     if (r != VK_SUCCESS) return r;
     if (!rtr_vertex_format(t->vertexFormat, &code, &bytes, &component))
         return rtr_error(d, VK_ERROR_FEATURE_NOT_PRESENT, "vertex-format",
@@ -88,7 +88,7 @@ static VkResult check_triangles(RtrDevice d, const VkGeometryTrianglesNV* t, uns
 }
 
 static VkResult check_aabbs(RtrDevice d, const VkGeometryAABBNV* b, unsigned g, uint32_t* primitives) {
-    VkResult r = rtr_check_chain(d, "VkGeometryAABBNV", b->pNext);
+    VkResult r = rtr_check_structure(d, "VkGeometryAABBNV", b, VK_STRUCTURE_TYPE_GEOMETRY_AABB_NV);
     if (r != VK_SUCCESS) return r;
     if (b->stride % 8 != 0 || (b->stride < 24 && b->numAABBs > 1))
         return bad(d, "aabb-stride", "stride must be a multiple of 8 and at least 24", g);
@@ -98,13 +98,28 @@ static VkResult check_aabbs(RtrDevice d, const VkGeometryAABBNV* b, unsigned g, 
 }
 
 VkResult rtr_check_geometry(RtrDevice d, const VkGeometryNV* g, unsigned index, uint32_t* primitives) {
-    VkResult r = rtr_check_chain(d, "VkGeometryNV", g->pNext);
+    VkResult r = rtr_check_structure(d, "VkGeometryNV", g, VK_STRUCTURE_TYPE_GEOMETRY_NV);
     if (r != VK_SUCCESS) return r;
+    if (g->flags & ~(VkGeometryFlagsNV)(VK_GEOMETRY_OPAQUE_BIT_NV | VK_GEOMETRY_NO_DUPLICATE_ANY_HIT_INVOCATION_BIT_NV))
+        return bad(d, "geometry-flags", "flags other than OPAQUE and NO_DUPLICATE_ANY_HIT_INVOCATION", index);
     if (g->geometryType == VK_GEOMETRY_TYPE_TRIANGLES_NV)
         return check_triangles(d, &g->geometry.triangles, index, primitives);
     if (g->geometryType == VK_GEOMETRY_TYPE_AABBS_NV)
         return check_aabbs(d, &g->geometry.aabbs, index, primitives);
     return bad(d, "geometry-type", "geometryType must be TRIANGLES or AABBS", index);
+}
+
+static VkResult check_flags(RtrDevice d, VkBuildAccelerationStructureFlagsNV flags) {
+    const VkBuildAccelerationStructureFlagsNV fast = VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_TRACE_BIT_NV |
+                                                     VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_BUILD_BIT_NV;
+    const VkBuildAccelerationStructureFlagsNV known =
+        fast | VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV |
+        VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_COMPACTION_BIT_NV | VK_BUILD_ACCELERATION_STRUCTURE_LOW_MEMORY_BIT_NV;
+    if (!(flags & ~known) && (flags & fast) != fast) return VK_SUCCESS;
+    return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "build-flags",
+                     "acceleration structure: build flags 0x%x; PREFER_FAST_TRACE and PREFER_FAST_BUILD exclude each "
+                     "other, and flags beyond those of VK_NV_ray_tracing are not known",
+                     flags);
 }
 
 static VkResult fill_from_info(RtrDevice d, RtrAccelerationStructure as,
@@ -159,8 +174,11 @@ VkResult rtrCreateAccelerationStructure(RtrDevice d, const VkAccelerationStructu
     RtrAccelerationStructure as;
     VkResult r;
     *pAs = NULL;
-    if ((r = rtr_check_chain(d, "VkAccelerationStructureCreateInfoNV", info->pNext)) != VK_SUCCESS ||
-        (r = rtr_check_chain(d, "VkAccelerationStructureInfoNV", info->info.pNext)) != VK_SUCCESS)
+    if ((r = rtr_check_structure(d, "VkAccelerationStructureCreateInfoNV", info,
+                                 VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_CREATE_INFO_NV)) != VK_SUCCESS ||
+        (r = rtr_check_structure(d, "VkAccelerationStructureInfoNV", &info->info,
+                                 VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV)) != VK_SUCCESS ||
+        (r = check_flags(d, info->info.flags)) != VK_SUCCESS)
         return r;
     if (info->compactedSize && (info->info.geometryCount || info->info.instanceCount))
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "compacted-size",
@@ -201,14 +219,23 @@ void rtrGetAccelerationStructureMemoryRequirements(RtrDevice d,
                                                    RtrAccelerationStructure as, VkMemoryRequirements2* out) {
     RtrScratchLayout layout;
     VkDeviceSize size = as->size;
-    (void)d;
+    VkBaseOutStructure* next = out->pNext;
     if (type == VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_BUILD_SCRATCH_NV) {
         rtr_build_scratch(as->primitive_count, as->geometry_count, &layout);
         size = layout.total;
     } else if (type == VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_UPDATE_SCRATCH_NV) {
         rtr_update_scratch(as, &layout);
         size = layout.total;
+    } else if (type != VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_OBJECT_NV) {
+        rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "requirements-type",
+                  "memory requirements of type %d: OBJECT, BUILD_SCRATCH or UPDATE_SCRATCH", (int)type);
+        size = 0;
     }
+    /* The memory is that of a buffer, which may be any. */
+    for (; next; next = next->pNext)
+        if (next->sType == VK_STRUCTURE_TYPE_MEMORY_DEDICATED_REQUIREMENTS)
+            ((VkMemoryDedicatedRequirements*)next)->prefersDedicatedAllocation =
+                ((VkMemoryDedicatedRequirements*)next)->requiresDedicatedAllocation = VK_FALSE;
     out->memoryRequirements.size = rtr_align(size, RTC_AS_ALIGNMENT);
     out->memoryRequirements.alignment = RTC_AS_ALIGNMENT;
     out->memoryRequirements.memoryTypeBits = 0xffffffffu;

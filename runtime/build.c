@@ -83,7 +83,7 @@ static VkResult check_build(RtrBuild* b, const VkAccelerationStructureInfoNV* in
     if (!b->recorder->cmd)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "recorder-not-begun",
                          "build: rtrBeginRecorder first");
-    if ((r = rtr_check_chain(d, "VkAccelerationStructureInfoNV", info->pNext)) != VK_SUCCESS) return r;
+    if ((r = rtr_check_structure(d, "VkAccelerationStructureInfoNV", info, VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV)) != VK_SUCCESS) return r;
     if (!dst || !dst->buffer)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "not-bound", "build: dst is not bound");
     if (info->type != dst->type || info->flags != dst->flags)

@@ -57,6 +57,14 @@ VkResult rtr_check_chain(RtrDevice device, const char* owner, const void* next) 
 
 VkBool32 rtrIsValidating(RtrDevice d) { return d->validation; }
 
+VkResult rtr_check_structure(RtrDevice device, const char* owner, const void* structure, VkStructureType type) {
+    const VkBaseInStructure* s = structure;
+    if (s->sType != type)
+        return rtr_error(device, VK_ERROR_VALIDATION_FAILED_EXT, "sType", "%s::sType is %d, not %d", owner,
+                         (int)s->sType, (int)type);
+    return rtr_check_chain(device, owner, s->pNext);
+}
+
 void rtrReportMessage(RtrDevice device, VkDebugUtilsMessageSeverityFlagBitsEXT severity, const char* id,
                       const char* text) {
     if (severity == VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT) {

@@ -370,7 +370,7 @@ static void put_header(const HostBuild* b, RtrAccelerationStructure dst, const B
 static VkResult check(RtrDevice d, const VkAccelerationStructureInfoNV* info, const RtrHostGeometry* data,
                       RtrAccelerationStructure dst, const void* memory, uint32_t* total) {
     uint32_t g;
-    VkResult r = rtr_check_chain(d, "VkAccelerationStructureInfoNV", info->pNext);
+    VkResult r = rtr_check_structure(d, "VkAccelerationStructureInfoNV", info, VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV);
     if (r != VK_SUCCESS) return r;
     if (!dst || !dst->buffer || !memory || dst->compacted_size)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "not-bound",

@@ -327,6 +327,8 @@ void rtr_warning(RtrDevice device, const char* id, const char* format, ...) RTR_
 
 /* Success for NULL; else an error that names the structure found behind `owner`::pNext. */
 VkResult rtr_check_chain(RtrDevice device, const char* owner, const void* next);
+/* A structure of Vulkan's: its sType, and nothing behind it. */
+VkResult rtr_check_structure(RtrDevice device, const char* owner, const void* structure, VkStructureType type);
 VkResult rtr_not_begun(RtrRecorder recorder, const char* function);
 
 /* ---- Assumptions (assumptions.c) -------------------------------------------------------- */

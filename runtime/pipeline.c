@@ -1,6 +1,20 @@
 /* RtrPipeline: a linked module as one compute pipeline, its layout and its groups. */
 #include "internal.h"
 
+/* Flags that mean something for the compute pipeline; those that only promise what rays need not
+ * know are taken and dropped. */
+#define COMPUTE_FLAGS                                                                              \
+    (VK_PIPELINE_CREATE_DISABLE_OPTIMIZATION_BIT | VK_PIPELINE_CREATE_ALLOW_DERIVATIVES_BIT |      \
+     VK_PIPELINE_CREATE_DEFER_COMPILE_BIT_NV | VK_PIPELINE_CREATE_CAPTURE_STATISTICS_BIT_KHR |     \
+     VK_PIPELINE_CREATE_CAPTURE_INTERNAL_REPRESENTATIONS_BIT_KHR |                                 \
+     VK_PIPELINE_CREATE_FAIL_ON_PIPELINE_COMPILE_REQUIRED_BIT |                                    \
+     VK_PIPELINE_CREATE_EARLY_RETURN_ON_FAILURE_BIT)
+#define PROMISES                                                        \
+    (VK_PIPELINE_CREATE_RAY_TRACING_NO_NULL_ANY_HIT_SHADERS_BIT_KHR |     \
+     VK_PIPELINE_CREATE_RAY_TRACING_NO_NULL_CLOSEST_HIT_SHADERS_BIT_KHR | \
+     VK_PIPELINE_CREATE_RAY_TRACING_NO_NULL_MISS_SHADERS_BIT_KHR |        \
+     VK_PIPELINE_CREATE_RAY_TRACING_NO_NULL_INTERSECTION_SHADERS_BIT_KHR)
+
 static const VkDescriptorType k_reserved_types[RTC_BINDING_COUNT] = {
     VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER_DYNAMIC, VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER,
     VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,         VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
@@ -207,7 +221,7 @@ static VkResult create_pipeline(RtrDevice d, VkPipelineCache cache,
     }
     rtr_free(a, narrowed);
     if (r == VK_SUCCESS) {
-        create.flags = info->flags & ~(VkPipelineCreateFlags)VK_PIPELINE_CREATE_DEFER_COMPILE_BIT_NV;
+        create.flags = info->flags & ~(VkPipelineCreateFlags)(VK_PIPELINE_CREATE_DEFER_COMPILE_BIT_NV | PROMISES);
         create.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
         create.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
         create.stage.module = handle;
@@ -283,6 +297,10 @@ VkResult rtrCreateRayTracingPipeline(RtrDevice d, VkPipelineCache cache,
     VkResult r;
     *pPipeline = NULL;
     if ((r = rtr_check_chain(d, "RtrRayTracingPipelineCreateInfo", info->pNext)) != VK_SUCCESS) return r;
+    if (info->flags & ~(VkPipelineCreateFlags)(COMPUTE_FLAGS | PROMISES))
+        return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "pipeline-flags",
+                         "pipeline: flags 0x%x are none that a pipeline of rtc can have",
+                         info->flags & ~(VkPipelineCreateFlags)(COMPUTE_FLAGS | PROMISES));
     if (info->setLayoutCount > 32)
         return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "set-layouts", "%u set layouts; at most 32", info->setLayoutCount);
     if ((r = rtr_parse_module(d, info->pCode, info->codeSize, a, &module)) != VK_SUCCESS) return r;

@@ -71,7 +71,7 @@ typedef struct RtrAccelerationStructure_T* RtrAccelerationStructure;
 typedef struct RtrPipeline_T* RtrPipeline;
 typedef struct RtrRecorder_T* RtrRecorder;
 
-/* ABI version of this runtime (RTC_ABI_VERSION it was built with). */
+/* ABI version of this runtime (RTC_ABI_VERSION it was built with). No counterpart. */
 RTR_API uint32_t rtrGetAbiVersion(void);
 
 /* ---- What a device offers ----------------------------------------------------- */
@@ -194,10 +194,11 @@ RTR_API const RtrPhysicalDeviceSupport* rtrGetDeviceSupport(RtrDevice device);
  * Counterpart: vkGetPhysicalDeviceProperties2. */
 RTR_API void rtrGetRayTracingProperties(RtrDevice device,
                                         VkPhysicalDeviceRayTracingPropertiesNV* pProperties);
-/* The same for the structures of VK_KHR_ray_tracing_pipeline and
- * VK_KHR_acceleration_structure. */
+/* The same for VK_KHR_ray_tracing_pipeline's structure. Counterpart: vkGetPhysicalDeviceProperties2. */
 RTR_API void rtrGetRayTracingPipelineProperties(RtrDevice device,
                                                 VkPhysicalDeviceRayTracingPipelinePropertiesKHR* pProperties);
+/* Fills VkPhysicalDeviceAccelerationStructurePropertiesKHR (pNext is left alone).
+ * Counterpart: vkGetPhysicalDeviceProperties2. */
 RTR_API void rtrGetAccelerationStructureProperties(
     RtrDevice device, VkPhysicalDeviceAccelerationStructurePropertiesKHR* pProperties);
 
@@ -212,7 +213,9 @@ RTR_API void rtrReportMessage(RtrDevice device, VkDebugUtilsMessageSeverityFlagB
 /* ---- Enums of the extension, turned into valid Vulkan 1.1 ones --------------------
  * Without VK_NV_ray_tracing its enums must not reach vkCreateBuffer and friends. Each
  * function maps the ray tracing values to what the runtime uses and keeps the rest. */
-/* RAY_TRACING_BIT_NV -> STORAGE | INDIRECT | TRANSFER_SRC | TRANSFER_DST */
+/* RAY_TRACING_BIT_NV (SHADER_BINDING_TABLE_BIT_KHR) -> STORAGE | INDIRECT | TRANSFER_SRC | TRANSFER_DST;
+ * KHR's BUILD_INPUT_READ_ONLY -> STORAGE, ACCELERATION_STRUCTURE_STORAGE -> STORAGE | TRANSFER_SRC | TRANSFER_DST
+ * (for address mode; heaps need RTR_HEAP_BUFFER_USAGE) */
 RTR_API VkBufferUsageFlags rtrTranslateBufferUsage(VkBufferUsageFlags usage);
 /* RAY_TRACING_SHADER, ACCELERATION_STRUCTURE_BUILD -> COMPUTE_SHADER (and TRANSFER for the latter) */
 RTR_API VkPipelineStageFlags rtrTranslatePipelineStages(VkPipelineStageFlags stages);
@@ -226,11 +229,13 @@ RTR_API VkDescriptorType rtrTranslateDescriptorType(VkDescriptorType type);
 RTR_API VkPipelineBindPoint rtrTranslateBindPoint(VkPipelineBindPoint bindPoint);
 /* The same for VK_KHR_synchronization2 (also AS copy, and SBT reads) */
 RTR_API VkPipelineStageFlags2 rtrTranslatePipelineStages2(VkPipelineStageFlags2 stages);
+/* The same for VK_KHR_synchronization2: AS reads and writes, and SBT reads -> SHADER_READ */
 RTR_API VkAccessFlags2 rtrTranslateAccess2(VkAccessFlags2 access);
 /* Arrays of structures: `count` elements of pIn with their types and stages translated.
  * pOut may be pIn. A pool may name one type several times. */
 RTR_API void rtrTranslatePoolSizes(uint32_t count, const VkDescriptorPoolSize* pIn,
                                    VkDescriptorPoolSize* pOut);
+/* The same of set layouts' bindings: descriptor types and stages. pOut may be pIn. */
 RTR_API void rtrTranslateLayoutBindings(uint32_t count, const VkDescriptorSetLayoutBinding* pIn,
                                         VkDescriptorSetLayoutBinding* pOut);
 /* All ray tracing stages are one stage now, and a layout has one range a stage: theirs and
@@ -277,6 +282,7 @@ typedef struct RtrHeapCreateInfo {
  * No counterpart: it stands where NV binds VkDeviceMemory. */
 RTR_API VkResult rtrCreateHeap(RtrDevice device, const RtrHeapCreateInfo* pCreateInfo,
                                const VkAllocationCallbacks* pAllocator, RtrHeap* pHeap);
+/* Structures bound to it must be gone; its buffer stays. NULL is ignored. No counterpart. */
 RTR_API void rtrDestroyHeap(RtrDevice device, RtrHeap heap, const VkAllocationCallbacks* pAllocator);
 
 /* Records the zeroing of the heap's first 256 bytes, with the barrier that makes it
@@ -301,16 +307,19 @@ RTR_API void rtrFreeHeapRange(RtrHeap heap, VkDeviceSize offset);
  * R32G32B32 and R32G32 SFLOAT, R16G16B16 and R16G16 SFLOAT and SNORM (also with an
  * alpha that is ignored; a missing z is 0); index types NONE_NV, UINT8_EXT, UINT16, UINT32. One
  * kind of geometry per bottom level.
- * Errors: VALIDATION_FAILED for counts, formats, mixed geometry types, unknown pNext. */
+ * Errors: VALIDATION_FAILED for counts, formats, mixed geometry types, unknown pNext and flags, another sType. */
 RTR_API VkResult rtrCreateAccelerationStructure(RtrDevice device,
                                                 const VkAccelerationStructureCreateInfoNV* pCreateInfo,
                                                 const VkAllocationCallbacks* pAllocator,
                                                 RtrAccelerationStructure* pAccelerationStructure);
+/* The device has finished with it; its memory is free for others. NULL is ignored.
+ * Counterpart: vkDestroyAccelerationStructureNV. */
 RTR_API void rtrDestroyAccelerationStructure(RtrDevice device, RtrAccelerationStructure accelerationStructure,
                                              const VkAllocationCallbacks* pAllocator);
 
 /* Size and alignment (256) of the object, its build scratch or its update scratch.
- * memoryTypeBits is all ones: the memory is a buffer of yours.
+ * memoryTypeBits is all ones: the memory is a buffer of yours. VkMemoryDedicatedRequirements behind
+ * pNext says no twice. An unknown type gives size 0 and a message.
  * Counterpart: vkGetAccelerationStructureMemoryRequirementsNV. */
 RTR_API void rtrGetAccelerationStructureMemoryRequirements(
     RtrDevice device, VkAccelerationStructureMemoryRequirementsTypeNV type,
@@ -345,12 +354,14 @@ RTR_API VkResult rtrGetAccelerationStructureHandle(RtrDevice device,
                                                    size_t dataSize, void* pData);
 
 /* What to write into a VK_DESCRIPTOR_TYPE_STORAGE_BUFFER descriptor where the shader
- * declares accelerationStructureNV/EXT. The _Null form needs any heap that was
- * initialised: rays traced into it miss. (256 zero bytes of any STORAGE buffer are a null
- * structure too, in both modes.) */
+ * declares accelerationStructureNV/EXT. Counterpart: VkWriteDescriptorSetAccelerationStructureNV.
+ * Errors: VALIDATION_FAILED for a structure that is not bound. */
 RTR_API VkResult rtrGetAccelerationStructureDescriptor(RtrDevice device,
                                                        RtrAccelerationStructure accelerationStructure,
                                                        VkDescriptorBufferInfo* pInfo);
+/* The same for no structure: rays traced into it miss. Any heap that was initialised has one. (256
+ * zero bytes of any STORAGE buffer are a null structure too, in both modes.) Counterpart:
+ * VK_NULL_HANDLE in VkWriteDescriptorSetAccelerationStructureNV, with nullDescriptor. */
 RTR_API VkResult rtrGetNullAccelerationStructureDescriptor(RtrDevice device, RtrHeap heap,
                                                            VkDescriptorBufferInfo* pInfo);
 /* Writes `count` structures into array elements from dstArrayElement on of such a
@@ -416,19 +427,23 @@ RTR_API VkDeviceSize rtrGetRecorderControlSize(RtrDevice device, uint32_t launch
  * recorded. Counterpart: the ray tracing state of a VkCommandBuffer. */
 RTR_API VkResult rtrCreateRecorder(RtrDevice device, const RtrRecorderCreateInfo* pCreateInfo,
                                    const VkAllocationCallbacks* pAllocator, RtrRecorder* pRecorder);
+/* The device has finished with all that was recorded. NULL is ignored. Counterpart: vkFreeCommandBuffers,
+ * of that state. */
 RTR_API void rtrDestroyRecorder(RtrDevice device, RtrRecorder recorder,
                                 const VkAllocationCallbacks* pAllocator);
 
 /* Records into `commandBuffer` from now on; it must be in the recording state, of a
  * compute-capable queue family, outside a render pass. Ray tracing bindings start
  * empty; heap, launch scratch and launch limits stay. Pieces given out earlier stay
- * taken, so that several command buffers can be recorded one after the other. */
+ * taken, so that several command buffers can be recorded one after the other.
+ * Counterpart: vkBeginCommandBuffer, of the ray tracing state. */
 RTR_API VkResult rtrBeginRecorder(RtrRecorder recorder, VkCommandBuffer commandBuffer);
 /* The device has finished with (or will never execute) all that was recorded: sets
  * and control pieces are free again. Contents of control blocks stay readable until
- * the next command buffer runs. */
+ * the next command buffer runs. Counterpart: what vkResetCommandBuffer gives back. */
 RTR_API VkResult rtrRetireRecorder(RtrRecorder recorder);
-/* rtrRetireRecorder, and forgets the command buffer, bindings, heap and scratch. */
+/* rtrRetireRecorder, and forgets the command buffer, bindings, heap and scratch.
+ * Counterpart: vkResetCommandBuffer. */
 RTR_API VkResult rtrResetRecorder(RtrRecorder recorder);
 
 /* ---- Build, copy, query ------------------------------------------------------------ */
@@ -525,8 +540,11 @@ RTR_API VkResult rtrBuildAccelerationStructureOnHost(RtrDevice device,
                                                      const VkAllocationCallbacks* pAllocator);
 
 /* Clone or compact. dst must be large enough: for COMPACT created with the
- * compactedSize that the query returned. Both must be in the same heap, or both be bound to
- * buffers.
+ * compactedSize that the query returned. Only the device knows that size: a COMPACT into
+ * less leaves a null structure (every ray misses it; an instance of it is a bad one, see
+ * RTC_HDR_BAD_INSTANCE), whose header says in RTC_HDR_SIZE_QUADS how many quads it needs.
+ * Both must be in the same heap, or both be bound to buffers.
+ * Errors: VALIDATION_FAILED for types, heaps, modes, and a clone into less than its source has.
  * Counterpart: vkCmdCopyAccelerationStructureNV. Stage COMPUTE_SHADER. */
 RTR_API VkResult rtrCmdCopyAccelerationStructure(RtrRecorder recorder, RtrAccelerationStructure dst,
                                                  RtrAccelerationStructure src,
@@ -657,6 +675,7 @@ typedef struct RtrRayTracingPipelineCreateInfo {
 RTR_API VkResult rtrCreateRayTracingPipeline(RtrDevice device, VkPipelineCache pipelineCache,
                                              const RtrRayTracingPipelineCreateInfo* pCreateInfo,
                                              const VkAllocationCallbacks* pAllocator, RtrPipeline* pPipeline);
+/* The device has finished with it. NULL is ignored. Counterpart: vkDestroyPipeline. */
 RTR_API void rtrDestroyPipeline(RtrDevice device, RtrPipeline pipeline,
                                 const VkAllocationCallbacks* pAllocator);
 
@@ -705,6 +724,7 @@ typedef struct RtrPipelineInfo {
     VkPipeline pipeline;
 } RtrPipelineInfo;
 
+/* What the pipeline's module says of itself, and the Vulkan objects made of it. No counterpart. */
 RTR_API void rtrGetPipelineInfo(RtrPipeline pipeline, RtrPipelineInfo* pInfo);
 
 /* ---- Reserved bindings inside a set of the application (rtc --reserved=SET.BINDING) -- */
@@ -903,6 +923,7 @@ typedef struct RtrFloatProbe {
 /* Records the probe; writes RTR_FLOAT_PROBE_BYTES at dstOffset (multiple of 256) of a
  * STORAGE buffer, in COMPUTE_SHADER. */
 RTR_API VkResult rtrCmdProbeFloat(RtrRecorder recorder, VkBuffer dstBuffer, VkDeviceSize dstOffset);
+/* What those bytes, read after the device has finished, mean. No counterpart. */
 RTR_API void rtrDecodeFloatProbe(const void* pData, RtrFloatProbe* pProbe);
 
 #ifdef __cplusplus

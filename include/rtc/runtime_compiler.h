@@ -37,6 +37,21 @@ static inline VkResult rtr_stages_error(RtrDevice device, const char* id, const 
     return VK_ERROR_VALIDATION_FAILED_EXT;
 }
 
+/* The runtime's own check, for structures that only this header reads. */
+static inline VkResult rtr_check_structure(RtrDevice device, const char* owner, VkStructureType type,
+                                           VkStructureType expected, const void* next) {
+    char text[160];
+    if (type != expected) {
+        snprintf(text, sizeof text, "%s::sType is %d, not %d", owner, (int)type, (int)expected);
+        return rtr_stages_error(device, "sType", text);
+    }
+    if (!next) return VK_SUCCESS;
+    snprintf(text, sizeof text,
+             "%s::pNext leads to a structure of type %d, which rtc does not know; it must be NULL", owner,
+             (int)((const VkBaseInStructure*)next)->sType);
+    return rtr_stages_error(device, "pNext", text);
+}
+
 static inline rtcc_stage rtr_stage_of(VkShaderStageFlagBits stage) {
     switch (stage) {
         case VK_SHADER_STAGE_RAYGEN_BIT_NV:
@@ -61,12 +76,23 @@ static inline VkResult rtr_add_stage(RtrDevice device, rtcc_pipeline_t pipeline,
     const VkBaseInStructure* next = (const VkBaseInStructure*)info->pNext;
     const VkShaderModuleCreateInfo* code;
     const VkSpecializationInfo* constants = info->pSpecializationInfo;
-    char name[24], text[128];
+    char name[24], text[192];
+    VkResult r;
     uint32_t i;
     int32_t stage;
-    while (next && next->sType != VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO) next = next->pNext;
-    code = (const VkShaderModuleCreateInfo*)next;
+    /* A stage's chain is the words and nothing else. */
+    code = next && next->sType == VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO
+               ? (const VkShaderModuleCreateInfo*)next
+               : NULL;
+    r = rtr_check_structure(device, "VkPipelineShaderStageCreateInfo", info->sType,
+                            VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO, code ? code->pNext : (const void*)next);
+    if (r != VK_SUCCESS) return r;
     snprintf(name, sizeof name, "stage %u", (unsigned)index);
+    if (info->flags || (code && code->flags)) {
+        snprintf(text, sizeof text, "%s: flags 0x%x of the stage, 0x%x of its module: subgroup sizes and others are "
+                 "not a ray tracing stage's to ask for", name, (unsigned)info->flags, code ? (unsigned)code->flags : 0u);
+        return rtr_stages_error(device, "stage", text);
+    }
     if (!code || info->module || rtr_stage_of(info->stage) == RTCC_STAGE_AUTO) {
         snprintf(text, sizeof text, "%s: needs a ray tracing stage bit, no module, and a VkShaderModuleCreateInfo",
                  name);
@@ -96,6 +122,9 @@ static inline VkResult rtr_add_group(RtrDevice device, rtcc_pipeline_t pipeline,
     const int general = info->type == VK_RAY_TRACING_SHADER_GROUP_TYPE_GENERAL_NV;
     char name[24], text[128];
     uint32_t i;
+    const VkResult r = rtr_check_structure(device, "VkRayTracingShaderGroupCreateInfoNV", info->sType,
+                                           VK_STRUCTURE_TYPE_RAY_TRACING_SHADER_GROUP_CREATE_INFO_NV, info->pNext);
+    if (r != VK_SUCCESS) return r;
     snprintf(name, sizeof name, "group %u", (unsigned)index);
     for (i = 0; i < 4; i++) {
         stage[i] = shaders[i] == VK_SHADER_UNUSED_NV ? -1 : (int32_t)shaders[i];
@@ -120,9 +149,12 @@ static inline VkResult rtr_add_group(RtrDevice device, rtcc_pipeline_t pipeline,
 /* Links the stages into a module and makes a pipeline of it. Group n of pCreateInfo is group
  * n of the pipeline. Compiler messages go to the device's messenger. pCreateInfo's `layout`
  * and base pipeline are ignored. On a device with validation the checking variant of traversal is
- * linked (rtcc_options_set_checked). Thread-safe as rtcc_compile_pipeline is.
+ * linked (rtcc_options_set_checked). maxRecursionDepth is the linker's (at most 31); with 0 no shader
+ * may trace at all. Thread-safe as rtcc_compile_pipeline is. Host memory of the compiler is malloc's:
+ * pAllocator is for the pipeline.
  * Counterpart: vkCreateRayTracingPipelinesNV (one pipeline a call).
- * Errors: VALIDATION_FAILED with a message for what cannot be compiled or linked; those of
+ * Errors: VALIDATION_FAILED with a message for what cannot be compiled or linked, for structures behind
+ * pNext other than a stage's words, for another sType and for flags of stages; those of
  * rtrCreateRayTracingPipeline. */
 static inline VkResult rtrCreateRayTracingPipelineFromStages(RtrDevice device, VkPipelineCache pipelineCache,
                                                              const VkRayTracingPipelineCreateInfoNV* pCreateInfo,
@@ -137,6 +169,9 @@ static inline VkResult rtrCreateRayTracingPipelineFromStages(RtrDevice device, V
     uint32_t i;
     size_t d;
     *pPipeline = NULL;
+    if (r == VK_SUCCESS)
+        r = rtr_check_structure(device, "VkRayTracingPipelineCreateInfoNV", pCreateInfo->sType,
+                                VK_STRUCTURE_TYPE_RAY_TRACING_PIPELINE_CREATE_INFO_NV, pCreateInfo->pNext);
     for (i = 0; r == VK_SUCCESS && i < pCreateInfo->stageCount; i++)
         r = rtr_add_stage(device, pipeline, i, &pCreateInfo->pStages[i]);
     for (i = 0; r == VK_SUCCESS && i < pCreateInfo->groupCount; i++)
@@ -160,6 +195,10 @@ static inline VkResult rtrCreateRayTracingPipelineFromStages(RtrDevice device, V
                          message.id, message.text);
     }
     if (r == VK_SUCCESS && rtcc_result_status(result) != RTCC_STATUS_SUCCESS) r = VK_ERROR_VALIDATION_FAILED_EXT;
+    /* No depth: not even ray generation traces. */
+    for (d = 0; r == VK_SUCCESS && !pCreateInfo->maxRecursionDepth && d < rtcc_result_reflection(result)->trace_site_count; d++)
+        if (!rtcc_result_reflection(result)->trace_sites[d].callable)
+            r = rtr_stages_error(device, "recursion-limit", "maxRecursionDepth is 0, but a shader traces; it must be 1 or more");
     if (r == VK_SUCCESS) {
         memset(&info, 0, sizeof info);
         info.flags = pCreateInfo->flags & ~(VkPipelineCreateFlags)VK_PIPELINE_CREATE_DERIVATIVE_BIT;

@@ -311,6 +311,12 @@ TEST_F(LifetimeTest, EnumsBecomeValidOnes) {
                 VK_BUFFER_USAGE_STORAGE_BUFFER_BIT);
     EXPECT_EQ(rtrTranslateBufferUsage(VK_BUFFER_USAGE_VERTEX_BUFFER_BIT),
               VkBufferUsageFlags(VK_BUFFER_USAGE_VERTEX_BUFFER_BIT));
+    EXPECT_EQ(rtrTranslateBufferUsage(VK_BUFFER_USAGE_ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_BIT_KHR |
+                                      VK_BUFFER_USAGE_VERTEX_BUFFER_BIT),
+              VkBufferUsageFlags(VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_VERTEX_BUFFER_BIT));
+    EXPECT_EQ(rtrTranslateBufferUsage(VK_BUFFER_USAGE_ACCELERATION_STRUCTURE_STORAGE_BIT_KHR |
+                                      VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT),
+              VkBufferUsageFlags(RTR_ADDRESS_BUFFER_USAGE));
     EXPECT_EQ(rtrTranslatePipelineStages(VK_PIPELINE_STAGE_RAY_TRACING_SHADER_BIT_NV),
               VkPipelineStageFlags(VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT));
     EXPECT_EQ(rtrTranslateShaderStages(VK_SHADER_STAGE_RAYGEN_BIT_NV | VK_SHADER_STAGE_VERTEX_BIT),
@@ -333,6 +339,42 @@ TEST_F(LifetimeTest, EnumsBecomeValidOnes) {
     EXPECT_EQ(rtrTranslateAccess2(VK_ACCESS_2_ACCELERATION_STRUCTURE_WRITE_BIT_KHR),
               VK_ACCESS_2_SHADER_READ_BIT | VK_ACCESS_2_SHADER_WRITE_BIT);
 }
+
+// Structures are no objects of Vulkan's; in tools their buffer carries the name (VK_OBJECT_TYPE_ACCELERATION_STRUCTURE_NV).
+TEST_F(LifetimeTest, NamesOfStructuresAreThoseOfBuffers) {
+    auto set_name = reinterpret_cast<PFN_vkSetDebugUtilsObjectNameEXT>(
+        vk->get_instance_proc_addr(vk->instance, "vkSetDebugUtilsObjectNameEXT"));
+    if (!set_name) GTEST_SKIP() << "no VK_EXT_debug_utils";
+    Buffer heap = vk->buffer(4096, RTR_HEAP_BUFFER_USAGE);
+    VkDebugUtilsObjectNameInfoEXT name{VK_STRUCTURE_TYPE_DEBUG_UTILS_OBJECT_NAME_INFO_EXT};
+    name.objectType = VK_OBJECT_TYPE_BUFFER;
+    name.objectHandle = uint64_t(heap.handle);
+    name.pObjectName = "the scene's structures";
+    EXPECT_EQ(set_name(vk->device, &name), VK_SUCCESS);
+    vk->destroy(heap);
+}
+
+TEST_F(LifetimeTest, MemoryRequirementsAnswerEverything) {
+    VkAccelerationStructureCreateInfoNV create{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_CREATE_INFO_NV};
+    create.info.sType = VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_INFO_NV;
+    create.info.instanceCount = 100;
+    RtrAccelerationStructure as = nullptr;
+    ASSERT_EQ(rtrCreateAccelerationStructure(rtr, &create, nullptr, &as), VK_SUCCESS);
+    VkMemoryDedicatedRequirements dedicated{VK_STRUCTURE_TYPE_MEMORY_DEDICATED_REQUIREMENTS};
+    dedicated.prefersDedicatedAllocation = dedicated.requiresDedicatedAllocation = VK_TRUE;
+    VkMemoryRequirements2 need{VK_STRUCTURE_TYPE_MEMORY_REQUIREMENTS_2, &dedicated, {}};
+    rtrGetAccelerationStructureMemoryRequirements(rtr, VK_ACCELERATION_STRUCTURE_MEMORY_REQUIREMENTS_TYPE_OBJECT_NV, as,
+                                                  &need);
+    EXPECT_GT(need.memoryRequirements.size, 100u * RTC_INSTANCE_QUADS * RTC_QUAD_BYTES);
+    EXPECT_EQ(need.memoryRequirements.alignment, 256u);
+    EXPECT_FALSE(dedicated.prefersDedicatedAllocation || dedicated.requiresDedicatedAllocation);
+    rtrGetAccelerationStructureMemoryRequirements(rtr, VkAccelerationStructureMemoryRequirementsTypeNV(77), as, &need);
+    EXPECT_EQ(need.memoryRequirements.size, 0u);
+    expect_runtime_error("requirements-type");
+    rtrDestroyAccelerationStructure(rtr, as, nullptr);
+}
+
+TEST_F(LifetimeTest, AbiVersionIsTheHeaders) { EXPECT_EQ(rtrGetAbiVersion(), RTC_ABI_VERSION); }
 
 TEST_F(LifetimeTest, ArraysOfStructuresBecomeValidOnes) {
     VkDescriptorPoolSize sizes[2] = {{VK_DESCRIPTOR_TYPE_ACCELERATION_STRUCTURE_NV, 3},
@@ -429,6 +471,8 @@ TEST_F(LifetimeTest, UnknownChainsAreNamed) {
     create.info.geometryCount = 1;
     create.info.pGeometries = &geometry;
     geometry.geometryType = VK_GEOMETRY_TYPE_TRIANGLES_NV;
+    geometry.geometry.triangles.sType = VK_STRUCTURE_TYPE_GEOMETRY_TRIANGLES_NV;
+    geometry.geometry.aabbs.sType = VK_STRUCTURE_TYPE_GEOMETRY_AABB_NV;
     geometry.geometry.triangles.pNext = &stranger;
     expect(rtrCreateAccelerationStructure(rtr, &create, nullptr, &as), "VkGeometryTrianglesNV");
     geometry.geometryType = VK_GEOMETRY_TYPE_AABBS_NV;

@@ -101,6 +101,12 @@ TEST_F(MisuseStructuresTest, Geometry) {
         {"aabb-offset", "multiple of 8", boxes, [](auto& g) { g.geometry.aabbs.offset = 4; }},
         {"geometry-type", "TRIANGLES or AABBS", triangles,
          [](auto& g) { g.geometryType = VK_GEOMETRY_TYPE_INSTANCES_KHR; }},
+        {"geometry-flags", "other than OPAQUE", triangles, [](auto& g) { g.flags = 8; }},
+        {"sType", "VkGeometryNV::sType is 5", triangles, [](auto& g) { g.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO; }},
+        {"sType", "VkGeometryTrianglesNV::sType is 0", triangles,
+         [](auto& g) { g.geometry.triangles.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO; }},
+        {"sType", "VkGeometryAABBNV::sType is 0", boxes,
+         [](auto& g) { g.geometry.aabbs.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO; }},
         {"maxTriangleCount", "the limit is 67108864", boxes,
          [](auto& g) { g.geometry.aabbs.numAABBs = (1u << 26) + 1; }, kAbsent},
     };
@@ -124,14 +130,23 @@ TEST_F(MisuseStructuresTest, Structures) {
         i.pGeometries = &triangles;
         return [this, i] { return create(i); };
     };
-    VkAccelerationStructureInfoNV unknown = info;
+    VkAccelerationStructureInfoNV unknown = info, generic = info, both = bottom, strange = bottom, untyped = bottom;
     unknown.type = VK_ACCELERATION_STRUCTURE_TYPE_MAX_ENUM_KHR;
+    generic.type = VK_ACCELERATION_STRUCTURE_TYPE_GENERIC_KHR;
+    both.flags = VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_TRACE_BIT_NV |
+                 VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_BUILD_BIT_NV;
+    strange.flags = 0x20;
+    untyped.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO;
     expect_refused(*vk, {
         {"as-counts", kInvalid, "a top level has no geometries", with(top, 0, 1)},
         {"as-counts", kInvalid, "a bottom level has no instances", with(bottom, 1, 0)},
         {"maxInstanceCount", kAbsent, "the limit is 16777216", with(top, (1u << 24) + 1, 0)},
         {"maxGeometryCount", kAbsent, "the limit is 16777215", with(bottom, 0, 1u << 24)},
         {"as-type", kInvalid, "must be TOP_LEVEL or BOTTOM_LEVEL", with(unknown, 0, 0)},
+        {"as-type", kInvalid, "must be TOP_LEVEL or BOTTOM_LEVEL", with(generic, 0, 0)},
+        {"build-flags", kInvalid, "exclude each other", with(both, 0, 0)},
+        {"build-flags", kInvalid, "flags 0x20", with(strange, 0, 0)},
+        {"sType", kInvalid, "VkAccelerationStructureInfoNV::sType is 0", with(untyped, 0, 0)},
     });
     VkAccelerationStructureCreateInfoNV compacted{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_CREATE_INFO_NV};
     compacted.info = top;
@@ -139,6 +154,9 @@ TEST_F(MisuseStructuresTest, Structures) {
     compacted.compactedSize = 1024;
     RtrAccelerationStructure as = nullptr;
     expect_refused(*vk, {{"compacted-size", kInvalid, "must be 0",
+                          [&] { return rtrCreateAccelerationStructure(rtr, &compacted, nullptr, &as); }}});
+    compacted.sType = VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_CREATE_INFO_KHR;
+    expect_refused(*vk, {{"sType", kInvalid, "VkAccelerationStructureCreateInfoNV::sType is",
                           [&] { return rtrCreateAccelerationStructure(rtr, &compacted, nullptr, &as); }}});
 }
 

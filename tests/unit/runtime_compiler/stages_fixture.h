@@ -100,6 +100,8 @@ class StagesTest : public RuntimeTest {
         info.groupCount = static_cast<uint32_t>(groups.size());
         info.pGroups = groups.data();
         info.maxRecursionDepth = recursion;
+        info.pNext = chain;
+        info.flags = flags;
         RtrStagesInfo more{};
         more.compiler = compiler;
         more.options = options;
@@ -171,4 +173,6 @@ class StagesTest : public RuntimeTest {
     RtrPipeline pipeline = nullptr;
     RtrHeap null_heap = nullptr;  // of structures that are NULL
     uint32_t recursion = 1, base = 1000, said[3] = {0, 0, 0};
+    const void* chain = nullptr;  // of the pipeline
+    VkPipelineCreateFlags flags = 0;
 };
