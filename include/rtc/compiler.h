@@ -158,6 +158,7 @@ RTCC_EXPORT void rtcc_compiler_release(rtcc_compiler_t compiler);
 
 /* ---- Options ----------------------------------------------------------------- */
 
+/* The defaults. NULL: out of memory. Not to be changed by one thread while others use them. */
 RTCC_EXPORT rtcc_options_t rtcc_options_create(void);
 /* A copy that shares nothing with the original, except the include callbacks'
  * user data pointer. NULL gives fresh options. */
@@ -335,6 +336,7 @@ RTCC_EXPORT const char* rtcc_stage_name(rtcc_stage stage);
 
 /* ---- Results ----------------------------------------------------------------- */
 
+/* And everything it handed out. NULL is ignored. */
 RTCC_EXPORT void rtcc_result_release(rtcc_result_t result);
 /* RTCC_STATUS_INTERNAL_ERROR for NULL. */
 RTCC_EXPORT rtcc_status rtcc_result_status(rtcc_const_result_t result);
@@ -356,6 +358,7 @@ typedef struct rtcc_diagnostic {
     const char* text;
 } rtcc_diagnostic;
 
+/* Errors and warnings, in the order they were found. */
 RTCC_EXPORT size_t rtcc_result_diagnostic_count(rtcc_const_result_t result);
 /* Empty strings and zeros for an index out of range. */
 RTCC_EXPORT rtcc_diagnostic rtcc_result_diagnostic(rtcc_const_result_t result, size_t index);
