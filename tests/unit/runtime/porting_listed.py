@@ -4,6 +4,7 @@ links lead somewhere, the tests are there, and each mentions a name of the row, 
 
 usage: porting_listed.py ROOT VULKAN_CORE_H
 """
+import functools
 import pathlib
 import re
 import sys
@@ -82,6 +83,7 @@ def helpers_of(file, seen):
     return found
 
 
+@functools.cache
 def told_by(file, label):
     """A test with all the helpers it reaches; of other links the whole file."""
     if not re.fullmatch(r"\w+\.\w+", label) or label.endswith(".md"):
@@ -92,7 +94,7 @@ def told_by(file, label):
         return ""
     told, helpers = braces(source, test.end() - 1), helpers_of(file, set())
     while True:
-        called = {n for n in helpers if re.search(rf"\b{n}\(", told)}
+        called = set(re.findall(r"\b(\w+)\(", told)) & helpers.keys()
         if not called:
             return told
         for name in called:
