@@ -1,7 +1,6 @@
 // Tier `fast`: plain slabs and Möller-Trumbore. Rays leak through edges and
 // vertices (several per cent of those aimed at them); the accuracy laboratory
 // measures how many.
-const float RTC_SLAB_GROWTH = 1.0;
 
 void rtc_level_numbers(RtcBase base, vec3 o, vec3 d, bool top) {
     // A finite reciprocal keeps 0 * inf out of the slabs.
@@ -13,9 +12,7 @@ void rtc_level_numbers(RtcBase base, vec3 o, vec3 d, bool top) {
     rtc_trav_pad = 0.0;
 }
 
-bool rtc_triangle(vec3 v0, vec3 v1, vec3 v2, out float t, out float b1, out float b2, out bool front,
-                  out bool undecided) {
-    undecided = false;
+bool rtc_triangle(vec3 v0, vec3 v1, vec3 v2, out float t, out float b1, out float b2, out bool front) {
     vec3 o = rtc_trav_origin;
     vec3 d = rtc_trav_direction;
     float ax = v1.x - v0.x, ay = v1.y - v0.y, az = v1.z - v0.z;

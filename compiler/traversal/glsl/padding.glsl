@@ -9,16 +9,14 @@ vec3 rtc_trav_shear; // d.kx / d.kz, d.ky / d.kz, d.kz
 
 // kz is the axis along which the ray moves fastest. kx, ky, kz: cyclic, so that orientation is kept. (mix with booleans is a
 // select, not arithmetic; `?:` of vectors would become a branch.)
-vec3 rtc_axes(vec3 v) {
-    return mix(mix(v, v.zxy, bvec3(rtc_axis() == 1u)), v.yzx, bvec3(rtc_axis() == 0u));
-}
+vec3 rtc_turned(vec3 v, uint axis) { return mix(mix(v, v.zxy, bvec3(axis == 1u)), v.yzx, bvec3(axis == 0u)); }
 
-// Slabs compute t = fl(fl(b - o) * inverse) with |error| <= (1 or 2 + 5 + 1 or
-// 2)u |t|, at most 9u. Near is compared with far, each off by 9u, and far's
-// growth rounds once more: 9u + 9u + 2u = 20u, and 24u leaves second-order
-// terms behind. Only far needs it, and only where t > 0: where far is
-// negative its sign, which rounding keeps, decides.
-const float RTC_SLAB_GROWTH = 1.00000143; // 1 + 24u
+vec3 rtc_axes(vec3 v) { return rtc_turned(v, rtc_axis()); }
+
+uint rtc_fastest_axis(vec3 d) {
+    vec3 a = abs(d);
+    return a.x > a.y ? (a.x > a.z ? 0u : 2u) : (a.y > a.z ? 1u : 2u);
+}
 
 // How far the triangle test's idea of a vertex can be from the vertex.
 //
@@ -31,8 +29,12 @@ const float RTC_SLAB_GROWTH = 1.00000143; // 1 + 24u
 // 4u D + 11u r under truncation. The edge decisions made with x, y are exact
 // (below), so a ray that hits does hit the triangle whose vertices are moved
 // by no more than that. t = Az + b1 (Bz - Az) + b2 (Cz - Az), over d.kz, is
-// off by at most 8u of D.kz / |d.kz|, which is 8u r along any axis, and t is
-// compared with near of the box, itself 9u r off: 5u D + 28u r covers all.
+// off by at most 8u of D.kz / |d.kz|, which is 8u r along any axis.
+//
+// Slabs compute t = fl(fl(b - o) * inverse) with |error| <= (1 or 2 + 5 + 1 or
+// 2)u |t|, at most 9u: as if the plane were moved by 9u |b - o| <= 9u (D + pad).
+// So near is never above its exact value and far never below. Together
+// 4u D + 11u r + 8u r + 9u D; 14u D + 20u r leave room for second-order terms.
 //
 // One number pads all axes, that of the widest: five more registers while a
 // ray walks cost a GPU more than the boxes that are visited in vain.
@@ -45,11 +47,11 @@ const float RTC_SLAB_GROWTH = 1.00000143; // 1 + 24u
 // Boxes of the top level hold instances: the triangle test there runs on
 // fl(W o), fl(W d), off by 4u (|W||o| + |w|) and 3u |W||d|, which M turns into
 // world distance again with |M||W| <= 3 for rotations and uniform scales:
-// 3 * (4u |o| + 4u (|o| + D)) + 3 * (3u + 2u + 8u) D = 24u |o| + 51u D, with
-// the largest component of each since a rotation mixes axes. (Builders widen
-// instance boxes for transforms that stretch more.)
-const float RTC_PAD_D = 2.98023224e-7; // 5u
-const float RTC_PAD_R = 1.66893005e-6; // 28u
+// 3 * (4u |o| + 4u (|o| + D)) + 3 * (3u + 2u + 8u) D = 24u |o| + 51u D, and 9u D for
+// the slabs, with the largest component of each since a rotation mixes axes. (Builders
+// widen instance boxes for transforms that stretch more.)
+const float RTC_PAD_D = 8.3446503e-7; // 14u
+const float RTC_PAD_R = 1.1920929e-6; // 20u
 const float RTC_PAD_ORIGIN = 1.49011612e-7; // 2.5u
 const float RTC_PAD_TOP_ORIGIN = 1.90734863e-6; // 32u
 const float RTC_PAD_TOP_D = 3.81469727e-6; // 64u
@@ -60,7 +62,7 @@ void rtc_level_numbers(RtcBase base, vec3 o, vec3 d, bool top) {
     vec3 bounds_min = uintBitsToFloat(rtc_quad(base, RTC_HDR_BOUNDS_MIN / 4u).xyz);
     vec3 bounds_max = uintBitsToFloat(rtc_quad(base, RTC_HDR_BOUNDS_MAX / 4u).xyz);
     vec3 a = abs(d);
-    rtc_set_axis(a.x > a.y ? (a.x > a.z ? 0u : 2u) : (a.y > a.z ? 1u : 2u));
+    rtc_set_axis(rtc_fastest_axis(d));
     vec3 k = rtc_axes(d);
     rtc_trav_shear = vec3(k.x / k.z, k.y / k.z, k.z);
 

@@ -13,12 +13,13 @@ const uint RTC_STEP_UNDECIDED = 6u; // inside rtc_trace_step only: floats do not
 bool rtc_inner(uint reference) { return (reference & RTC_REF_LEAF) == 0u; }
 uint rtc_count(uint reference) { return (reference >> RTC_REF_COUNT_SHIFT) & RTC_REF_COUNT_MASK; }
 
-// Turns that one triangle can take in exact arithmetic at worst, where nothing can suspend: nine determinants
-// of edges (wide.glsl: 12 + 3 * 43 + 2 turns each) and two comparisons of t (four determinants, 37^2 products
-// of limbs and 74 columns each). Lavapipe 22.3 counts the turns of all lanes of a group, which may take theirs
-// one after another, and ends all loops without a word: budgets that have room for that many leave it.
+// Turns that one triangle can take in exact arithmetic at worst, where nothing can suspend: nine determinants of
+// edges (wide.glsl: 18 + 3 * 37 + 2 turns each), two of t (one of them 6 more), and two comparisons of t (four
+// determinants, 37^2 products of limbs and 74 columns each), a turn of rtc_settle for each determinant. Lavapipe 22.3
+// counts the turns of all lanes of a group, which may take theirs one after another, and ends all loops without a
+// word: budgets that have room for that many leave it.
 #ifdef RTC_TIER_EXACT
-const uint RTC_TURNS_OF_A_TRIANGLE = 5400u;
+const uint RTC_TURNS_OF_A_TRIANGLE = 5500u;
 const uint RTC_WALK_BUDGET =
     RTC_STEP_BUDGET > RTC_TURNS_OF_A_TRIANGLE + 1024u ? RTC_STEP_BUDGET - RTC_TURNS_OF_A_TRIANGLE : RTC_STEP_BUDGET;
 #else
@@ -186,7 +187,7 @@ bool rtc_slab(vec3 low, vec3 high, out float near) {
     vec3 enter = min(t0, t1);
     vec3 leave = max(t0, t1);
     near = max(max(enter.x, enter.y), max(enter.z, rtc_trav_tmin));
-    float far = min(leave.x, min(leave.y, leave.z)) * RTC_SLAB_GROWTH;
+    float far = min(leave.x, min(leave.y, leave.z));
     return near <= min(far, rtc_trav_tmax);
 }
 
@@ -240,7 +241,7 @@ uint rtc_meet_triangle(uint slot, uint primitive, uint flags, float t, float b1,
     return result;
 }
 
-#ifndef RTC_TIER_EXACT
+#ifdef RTC_TIER_FAST
 uint rtc_test_triangle(uint slot) {
     RTC_CHECK(slot = rtc_checked_slot(slot);)
     RtcBase at = rtc_advance(rtc_trav_base, rtc_trav_slots + slot * RTC_TRIANGLE_QUADS);
@@ -248,41 +249,13 @@ uint rtc_test_triangle(uint slot) {
     uvec4 q1 = rtc_quad(at, 1u);
     uvec4 q2 = rtc_quad(at, 2u);
     float t, b1, b2;
-    bool front, undecided;
+    bool front;
     uint result = RTC_STEP_RUNNING;
-    if (rtc_triangle(uintBitsToFloat(q0.xyz), uintBitsToFloat(q1.xyz), uintBitsToFloat(q2.xyz), t, b1, b2, front,
-                     undecided)) {
-        result = rtc_meet_triangle(slot, q0.w, q1.w, t, b1, b2, front);
-    } else if (undecided) {
-        result = RTC_STEP_UNDECIDED;
-    }
-    return result;
-}
-
-#ifdef RTC_TIER_DEFERS
-// The same for a triangle that was undecided.
-uint rtc_settle_triangle(uint slot) {
-    RtcBase at = rtc_advance(rtc_trav_base, rtc_trav_slots + slot * RTC_TRIANGLE_QUADS);
-    uint turns;
-    float side = rtc_exact_side(rtc_sheared(uintBitsToFloat(rtc_quad(at, 0u).xyz)).xy,
-                                rtc_sheared(uintBitsToFloat(rtc_quad(at, 1u).xyz)).xy,
-                                rtc_sheared(uintBitsToFloat(rtc_quad(at, 2u).xyz)).xy, turns);
-    uint result = RTC_STEP_RUNNING;
-    if (side != 0.0) {
-        // Read again (after three turns, which compilers do not know) rather than kept meanwhile.
-        at = rtc_advance(at, turns - 3u);
-        uvec4 q0 = rtc_quad(at, 0u);
-        uvec4 q1 = rtc_quad(at, 1u);
-        uvec4 q2 = rtc_quad(at, 2u);
-        float t, b1, b2;
-        bool front;
-        rtc_triangle_at(uintBitsToFloat(q0.xyz), uintBitsToFloat(q1.xyz), uintBitsToFloat(q2.xyz), side, t, b1, b2,
-                        front);
+    if (rtc_triangle(uintBitsToFloat(q0.xyz), uintBitsToFloat(q1.xyz), uintBitsToFloat(q2.xyz), t, b1, b2, front)) {
         result = rtc_meet_triangle(slot, q0.w, q1.w, t, b1, b2, front);
     }
     return result;
 }
-#endif
 #endif
 
 uint rtc_test_aabb(uint slot) {
@@ -347,8 +320,11 @@ uint rtc_next_slot() {
     return slot;
 }
 
-#ifdef RTC_TIER_EXACT
+#if defined(RTC_TIER_EXACT)
 #include "exact_walk.glsl"
+#include "exact_settle.glsl"
+#elif !defined(RTC_TIER_FAST)
+#include "watertight_walk.glsl"
 #endif
 
 uint rtc_trace_step() {

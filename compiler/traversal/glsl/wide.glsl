@@ -12,10 +12,12 @@ const uint RTC_WIDE_MASK = 0x00ffffffu;
 
 int rtc_wide[4u * RTC_WIDE_LIMBS];
 
-// After rtc_wide_det, per accumulator: sign and range of limbs that are not 0.
-int rtc_wide_sign[4];
-uint rtc_wide_low[4];
-uint rtc_wide_high[4];
+// After rtc_wide_det, per accumulator: sign and range of limbs that are not 0 (no array: an index that differs between
+// lanes is dear); and of the last one the leading 49 to 72 bits as a pair, in units of 2^(24 (high - 1)).
+ivec4 rtc_wide_sign;
+uvec4 rtc_wide_low;
+uvec4 rtc_wide_high;
+vec2 rtc_wide_leading;
 
 uint rtc_mantissa(uint bits) {
     uint fraction = bits & 0x007fffffu;
@@ -68,55 +70,62 @@ uint rtc_wide_bottom_scale(uvec3 a, uvec3 b) {
 // det(x1 - x2, y1 - y2, z1 - z2), bits of floats, into an accumulator, where
 // at least two of x2, y2, z2 are equal or all but one 0, so that a
 // determinant with two of them is 0: four choices of vectors times six
-// permutations, of which two a turn. Limbs are left as magnitude.
+// permutations, one a turn. Limbs are left as magnitude.
 void rtc_wide_det(uint which, uvec3 x1, uvec3 x2, uvec3 y1, uvec3 y2, uvec3 z1, uvec3 z2) {
     uint base = which * RTC_WIDE_LIMBS;
     uint bottom = rtc_wide_bottom_scale(x1, x2) + rtc_wide_bottom_scale(y1, y2) + rtc_wide_bottom_scale(z1, z2);
     uint top = rtc_wide_top_scale(x1, x2) + rtc_wide_top_scale(y1, y2) + rtc_wide_top_scale(z1, z2);
     bottom = min(bottom, top) / 24u;
     top = top / 24u + 5u; // four limbs of a product, and carries
-    for (uint i = bottom; i <= top; ++i) {
+    [[dont_unroll]] for (uint i = bottom; i <= top; ++i) {
         rtc_wide[base + i] = 0;
     }
-    uint turns = rtc_wide_top_scale(x2, x2) == 0u ? 9u : 12u; // x2 is 0 but for t's numerator
-    for (uint i = 0u; i < turns; ++i) {
-        uint choice = i / 3u;
-        uint p = i - 3u * choice;
+    uint turns = rtc_wide_top_scale(x2, x2) == 0u ? 18u : 24u; // x2 is 0 but for t's numerator
+    [[dont_unroll]] for (uint i = 0u; i < turns; ++i) {
+        uint choice = i / 6u;
+        uint p = (i >> 1u) - 3u * choice;
+        bool swapped = (i & 1u) != 0u;
         uint next = p == 2u ? 0u : p + 1u;
         uint last = p == 0u ? 2u : p - 1u;
-        uint negate = choice == 0u ? 0u : 0x80000000u;
+        uint negate = (choice == 0u) == swapped ? 0x80000000u : 0u;
         uint x = rtc_pick(mix(x1, x2, bvec3(choice == 3u)), p);
-        uvec3 y = mix(y1, y2, bvec3(choice == 1u));
-        uvec3 z = mix(z1, z2, bvec3(choice == 2u));
-        rtc_wide_add(base, x, rtc_pick(y, next), rtc_pick(z, last), negate);
-        rtc_wide_add(base, x, rtc_pick(y, last), rtc_pick(z, next), negate ^ 0x80000000u);
+        uint y = rtc_pick(mix(y1, y2, bvec3(choice == 1u)), swapped ? last : next);
+        uint z = rtc_pick(mix(z1, z2, bvec3(choice == 2u)), swapped ? next : last);
+        rtc_wide_add(base, x, y, z, negate);
     }
     // Carries; the last one tells the sign. A negative number's limbs are its
     // two's complement, which the second round turns into the magnitude.
     int sign = 1;
     uint low = RTC_WIDE_LIMBS;
     uint high = 0u;
-    for (uint round = 0u; round < 2u; ++round) {
-        int carry = 0;
+    ivec3 leading = ivec3(0); // the highest limb that is not 0, and the two below it
+    [[dont_unroll]] for (uint round = 0u; round < 2u; ++round) {
+        int carry = 0, one_below = 0, two_below = 0;
         int flip = round == 0u ? 1 : -1;
         low = RTC_WIDE_LIMBS;
         high = 0u;
-        for (uint i = bottom; i <= top; ++i) {
+        [[dont_unroll]] for (uint i = bottom; i <= top; ++i) {
             int limb = flip * rtc_wide[base + i] + carry;
             carry = limb >> 24;
             limb = limb & int(RTC_WIDE_MASK);
             rtc_wide[base + i] = limb;
             low = limb != 0 ? min(low, i) : low;
             high = limb != 0 ? i : high;
+            leading = mix(leading, ivec3(limb, one_below, two_below), bvec3(limb != 0));
+            two_below = one_below;
+            one_below = limb;
         }
         if (round == 0u) {
             sign = carry < 0 ? -1 : 1;
             round += carry < 0 ? 0u : 1u;
         }
     }
-    rtc_wide_sign[which] = low == RTC_WIDE_LIMBS ? 0 : sign;
-    rtc_wide_low[which] = low;
-    rtc_wide_high[which] = high;
+    bvec4 here = equal(uvec4(which), uvec4(0u, 1u, 2u, 3u));
+    rtc_wide_sign = mix(rtc_wide_sign, ivec4(low == RTC_WIDE_LIMBS ? 0 : sign), here);
+    rtc_wide_low = mix(rtc_wide_low, uvec4(low), here);
+    rtc_wide_high = mix(rtc_wide_high, uvec4(high), here);
+    vec2 sum = rtc_two_sum(float(leading.x) * 16777216.0, float(leading.y));
+    rtc_wide_leading = rtc_quick_sum(sum.x, sum.y + float(leading.z) * 5.9604644775e-8);
     rtc_turns += turns + 3u * (top + 1u - bottom) + 2u;
 }
 
@@ -127,51 +136,41 @@ float rtc_ldexp(float q, int e) {
     return (((q * step) * step) * step) * rtc_power(127 + clamp(e, -500, 500) - 3 * half_way);
 }
 
-// The leading 49 to 72 bits as a pair, in units of 2^(24 (high - 1)).
-vec2 rtc_wide_top(uint which) {
-    uint at = which * RTC_WIDE_LIMBS + rtc_wide_high[which];
-    float first = float(rtc_wide[at]) * 16777216.0;
-    uint below = rtc_wide_high[which] - rtc_wide_low[which];
-    float second = below > 0u ? float(rtc_wide[at - 1u]) : 0.0;
-    float third = below > 1u ? float(rtc_wide[at - 2u]) * 5.9604644775e-8 : 0.0;
-    vec2 sum = rtc_two_sum(first, second);
-    return rtc_quick_sum(sum.x, sum.y + third);
-}
-
-// Accumulator 0 over accumulator 1, off by less than an ulp.
-float rtc_wide_quotient() {
-    float q = rtc_pair_quotient(rtc_wide_top(0u), rtc_wide_top(1u));
-    q = rtc_ldexp(q, 24 * (int(rtc_wide_high[0]) - int(rtc_wide_high[1])));
-    return rtc_wide_sign[0] * rtc_wide_sign[1] < 0 ? -q : (rtc_wide_sign[0] == 0 ? 0.0 : q);
+// Accumulator 0, whose leading bits come along, over accumulator 1, the last one; off by less than an ulp.
+float rtc_wide_quotient(vec2 above) {
+    float q = rtc_pair_quotient(above, rtc_wide_leading);
+    q = rtc_ldexp(q, 24 * (int(rtc_wide_high.x) - int(rtc_wide_high.y)));
+    return rtc_wide_sign.x * rtc_wide_sign.y < 0 ? -q : (rtc_wide_sign.x == 0 ? 0.0 : q);
 }
 
 // A limb of a number, 0 outside it.
-uint rtc_wide_limb(uint which, uint i) {
-    bool inside = i >= rtc_wide_low[which] && i <= rtc_wide_high[which];
+uint rtc_wide_limb(uint which, uint low, uint high, uint i) {
     uint limb = uint(rtc_wide[which * RTC_WIDE_LIMBS + i]);
-    return inside ? limb : 0u;
+    return i >= low && i <= high ? limb : 0u;
 }
 
 // Sign of 0 / 1 - 2 / 3, the divisors not being 0.
 int rtc_wide_compare() {
-    int left = rtc_wide_sign[0] * rtc_wide_sign[1];
-    int right = rtc_wide_sign[2] * rtc_wide_sign[3];
+    int left = rtc_wide_sign.x * rtc_wide_sign.y;
+    int right = rtc_wide_sign.z * rtc_wide_sign.w;
     int result = left > right ? 1 : (left < right ? -1 : 0);
     if (left == right && left != 0) {
         // |0| |3| - |2| |1|, column by column. The halves of 37 products of 48
         // bits sum up to less than 2^30.
-        uint first = min(rtc_wide_low[0], rtc_wide_low[2]), last = max(rtc_wide_high[0], rtc_wide_high[2]);
-        uint low = min(rtc_wide_low[1], rtc_wide_low[3]), high = max(rtc_wide_high[1], rtc_wide_high[3]);
+        uint first = min(rtc_wide_low.x, rtc_wide_low.z), last = max(rtc_wide_high.x, rtc_wide_high.z);
+        uint low = min(rtc_wide_low.y, rtc_wide_low.w), high = max(rtc_wide_high.y, rtc_wide_high.w);
         int carry = 0, above = 0;
         int any = 0;
-        for (uint k = first + low; k <= last + high; ++k) {
+        [[dont_unroll]] for (uint k = first + low; k <= last + high; ++k) {
             int lows = 0, highs = 0;
             uint from = k > high ? max(first, k - high) : first;
             uint to = min(last, k - low);
-            for (uint i = from; i <= to; ++i) {
+            [[dont_unroll]] for (uint i = from; i <= to; ++i) {
                 uint a_high, a_low, b_high, b_low;
-                umulExtended(rtc_wide_limb(0u, i), rtc_wide_limb(3u, k - i), a_high, a_low);
-                umulExtended(rtc_wide_limb(2u, i), rtc_wide_limb(1u, k - i), b_high, b_low);
+                umulExtended(rtc_wide_limb(0u, rtc_wide_low.x, rtc_wide_high.x, i),
+                             rtc_wide_limb(3u, rtc_wide_low.w, rtc_wide_high.w, k - i), a_high, a_low);
+                umulExtended(rtc_wide_limb(2u, rtc_wide_low.z, rtc_wide_high.z, i),
+                             rtc_wide_limb(1u, rtc_wide_low.y, rtc_wide_high.y, k - i), b_high, b_low);
                 lows += int(a_low & RTC_WIDE_MASK) - int(b_low & RTC_WIDE_MASK);
                 highs += int((a_low >> 24u) | (a_high << 8u)) - int((b_low >> 24u) | (b_high << 8u));
                 rtc_turns++;
