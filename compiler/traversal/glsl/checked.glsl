@@ -108,7 +108,7 @@ uint rtc_checked_slot(uint slot) {
 
 // Of the top level, whose header may not have been looked at.
 bool rtc_check_instance(uint instance) {
-    rtc_entries++;
+    rtc_entries += rtc_trav_cur == RTC_REF_ENTER ? 1u : 0u; // not where its data are made again
     bool there = rtc_check_header(rtc_ray_root, RTC_AS_KIND_TOP) && instance < rtc_slot_count;
     if (!there) {
         rtc_bad_memory(RTC_BAD_INSTANCE_INDEX, instance);

@@ -92,110 +92,108 @@ int rtc_sign(float v) { return v > 0.0 ? 1 : (v < 0.0 ? -1 : 0); }
 
 uvec3 rtc_bits(vec3 v) { return floatBitsToUint(v); }
 
-// Stage 2, with everything turned so that the ray moves fastest along z. Sides of edges, 0: not known, unless the
-// triangle is known to be hit; weights; t, which is known if `sound`; `behind`: the hit lies behind the origin.
+// Stage 2, with everything turned so that the ray moves fastest along z. Powers of two put m, the largest |v - o|,
+// and |d.kz| into [1, 2). Pairs lose their low parts, and squares their lives, outside a range; beyond it (`sound` is
+// false) every decision is the integers'.
 struct RtcStage2 {
-    ivec3 side;
-    float t, b1, b2;
-    bool sound, behind;
+    int m_exponent, d_exponent;
+    float m_scale, d_scale;
+    bool sound;
 };
 
-RtcStage2 rtc_stage2(vec3 p0, vec3 p1, vec3 p2, vec3 o, vec3 d, bool known) {
-    RtcStage2 result;
-    RTC_REAL ax = rtc_real_difference(p0.x, o.x), ay = rtc_real_difference(p0.y, o.y);
-    RTC_REAL az = rtc_real_difference(p0.z, o.z);
+RtcStage2 rtc_stage2(vec3 p0, vec3 p1, vec3 p2, vec3 o, vec3 d) {
+    RtcStage2 scaled;
     vec3 sizes = max(max(abs(p0 - o), abs(p1 - o)), abs(p2 - o));
     float m = max(sizes.x, max(sizes.y, sizes.z));
-    // Pairs lose their low parts, and squares their lives, outside a range;
-    // beyond it every decision is the integers'.
-    bool sound = m > 8.6736174e-19 && m < 1.1529215e18; // 2^-60, 2^60
-    // Powers of two that put m and |d.kz| into [1, 2).
-    int m_exponent = int(floatBitsToUint(m) >> 23u) - 127;
-    int d_exponent = int((floatBitsToUint(d.z) >> 23u) & 255u) - 127;
-    float m_scale = rtc_power(127 - clamp(m_exponent, -60, 60));
-    float d_scale = rtc_power(127 - d_exponent);
-    float dx = d.x * d_scale, dy = d.y * d_scale, dz = d.z * d_scale;
-    ax = rtc_real_shifted(ax, m_scale);
-    ay = rtc_real_shifted(ay, m_scale);
-    az = rtc_real_shifted(az, m_scale);
-    float e0, e1, e2; // edges as floats, for the weights
-    result.side = ivec3(1);
-    if (known) {
-        vec3 a = (p0 - o) * m_scale, b = (p1 - o) * m_scale, c = (p2 - o) * m_scale;
-        vec2 x0 = a.xy * dz - a.z * vec2(dx, dy);
-        vec2 x1 = b.xy * dz - b.z * vec2(dx, dy);
-        vec2 x2 = c.xy * dz - c.z * vec2(dx, dy);
-        e0 = x2.x * x1.y - x2.y * x1.x;
-        e1 = x0.x * x2.y - x0.y * x2.x;
-        e2 = x1.x * x0.y - x1.y * x0.x;
-    } else {
-        RTC_REAL bx = rtc_real_shifted(rtc_real_difference(p1.x, o.x), m_scale);
-        RTC_REAL by = rtc_real_shifted(rtc_real_difference(p1.y, o.y), m_scale);
-        RTC_REAL bz = rtc_real_shifted(rtc_real_difference(p1.z, o.z), m_scale);
-        RTC_REAL cx = rtc_real_shifted(rtc_real_difference(p2.x, o.x), m_scale);
-        RTC_REAL cy = rtc_real_shifted(rtc_real_difference(p2.y, o.y), m_scale);
-        RTC_REAL cz = rtc_real_shifted(rtc_real_difference(p2.z, o.z), m_scale);
-        RTC_REAL x0 = rtc_real_minus(rtc_real_scaled(ax, dz), rtc_real_scaled(az, dx));
-        RTC_REAL y0 = rtc_real_minus(rtc_real_scaled(ay, dz), rtc_real_scaled(az, dy));
-        RTC_REAL x1 = rtc_real_minus(rtc_real_scaled(bx, dz), rtc_real_scaled(bz, dx));
-        RTC_REAL y1 = rtc_real_minus(rtc_real_scaled(by, dz), rtc_real_scaled(bz, dy));
-        RTC_REAL x2 = rtc_real_minus(rtc_real_scaled(cx, dz), rtc_real_scaled(cz, dx));
-        RTC_REAL y2 = rtc_real_minus(rtc_real_scaled(cy, dz), rtc_real_scaled(cz, dy));
-        e0 = rtc_real_float(rtc_real_minor(x2, y1, y2, x1));
-        e1 = rtc_real_float(rtc_real_minor(x0, y2, y0, x2));
-        e2 = rtc_real_float(rtc_real_minor(x1, y0, y1, x0));
-        // w < 4, as m and |d.kz| are below 2. What is lost below 2^-126 costs
-        // less than 2^-100.
-        float l0 = float(rtc_real_size(x0)) + float(rtc_real_size(y0));
-        float l1 = float(rtc_real_size(x1)) + float(rtc_real_size(y1));
-        float l2 = float(rtc_real_size(x2)) + float(rtc_real_size(y2));
-        float unit = 4.0 * float(RTC_REAL_EDGE);
-        float extra = unit * unit + 7.888609e-31;
-        result.side.x = sound && abs(e0) > unit * (l1 + l2) + extra ? rtc_sign(e0) : 0;
-        result.side.y = sound && abs(e1) > unit * (l0 + l2) + extra ? rtc_sign(e1) : 0;
-        result.side.z = sound && abs(e2) > unit * (l0 + l1) + extra ? rtc_sign(e2) : 0;
-    }
+    scaled.sound = m > 8.6736174e-19 && m < 1.1529215e18; // 2^-60, 2^60
+    scaled.m_exponent = int(floatBitsToUint(m) >> 23u) - 127;
+    scaled.d_exponent = int((floatBitsToUint(d.z) >> 23u) & 255u) - 127;
+    scaled.m_scale = rtc_power(127 - clamp(scaled.m_exponent, -60, 60));
+    scaled.d_scale = rtc_power(127 - scaled.d_exponent);
+    return scaled;
+}
+
+// The side of one edge, 0: not known.
+int rtc_stage2_edge(RtcStage2 scaled, vec3 b, vec3 c, vec3 o, vec3 d) {
+    vec3 way = d * scaled.d_scale;
+    RTC_REAL bx = rtc_real_shifted(rtc_real_difference(b.x, o.x), scaled.m_scale);
+    RTC_REAL by = rtc_real_shifted(rtc_real_difference(b.y, o.y), scaled.m_scale);
+    RTC_REAL bz = rtc_real_shifted(rtc_real_difference(b.z, o.z), scaled.m_scale);
+    RTC_REAL cx = rtc_real_shifted(rtc_real_difference(c.x, o.x), scaled.m_scale);
+    RTC_REAL cy = rtc_real_shifted(rtc_real_difference(c.y, o.y), scaled.m_scale);
+    RTC_REAL cz = rtc_real_shifted(rtc_real_difference(c.z, o.z), scaled.m_scale);
+    bx = rtc_real_minus(rtc_real_scaled(bx, way.z), rtc_real_scaled(bz, way.x));
+    by = rtc_real_minus(rtc_real_scaled(by, way.z), rtc_real_scaled(bz, way.y));
+    cx = rtc_real_minus(rtc_real_scaled(cx, way.z), rtc_real_scaled(cz, way.x));
+    cy = rtc_real_minus(rtc_real_scaled(cy, way.z), rtc_real_scaled(cz, way.y));
+    float e = rtc_real_float(rtc_real_minor(cx, by, cy, bx));
+    // w < 4, as m and |d.kz| are below 2. What is lost below 2^-126 costs
+    // less than 2^-100.
+    float l = (float(rtc_real_size(bx)) + float(rtc_real_size(by))) + (float(rtc_real_size(cx)) + float(rtc_real_size(cy)));
+    float unit = 4.0 * float(RTC_REAL_EDGE);
+    return scaled.sound && abs(e) > unit * l + (unit * unit + 7.888609e-31) ? rtc_sign(e) : 0;
+}
+
+// Weights of a triangle that is hit, not more exact than floats.
+vec2 rtc_stage2_weights(RtcStage2 scaled, vec3 p0, vec3 p1, vec3 p2, vec3 o, vec3 d) {
+    vec3 a = (p0 - o) * scaled.m_scale, b = (p1 - o) * scaled.m_scale, c = (p2 - o) * scaled.m_scale;
+    vec3 way = d * scaled.d_scale;
+    vec2 x0 = a.xy * way.z - a.z * way.xy;
+    vec2 x1 = b.xy * way.z - b.z * way.xy;
+    vec2 x2 = c.xy * way.z - c.z * way.xy;
+    float e0 = x2.x * x1.y - x2.y * x1.x;
+    float e1 = x0.x * x2.y - x0.y * x2.x;
+    float e2 = x1.x * x0.y - x1.y * x0.x;
     float det = (e0 + e1) + e2;
     // Where all three drown in rounding the weights are anything in range.
-    bool weights = det != 0.0 && rtc_finite(det);
-    float inverse = 1.0 / (weights ? det : 1.0);
-    result.b1 = weights ? min(max(e1 * inverse, 0.0), 1.0) : 0.0;
-    result.b2 = weights ? min(max(e2 * inverse, 0.0), 1.0 - result.b1) : 0.0;
+    bool known = det != 0.0 && rtc_finite(det);
+    float inverse = 1.0 / (known ? det : 1.0);
+    float b1 = known ? min(max(e1 * inverse, 0.0), 1.0) : 0.0;
+    return vec2(b1, known ? min(max(e2 * inverse, 0.0), 1.0 - b1) : 0.0);
+}
 
+// t, known to an ulp if `sound`; `behind`: the hit lies behind the origin.
+float rtc_stage2_t(RtcStage2 scaled, vec3 p0, vec3 p1, vec3 p2, vec3 o, vec3 d, out bool sound, out bool behind) {
+    vec3 way = d * scaled.d_scale;
     // t = n . (v0 - o) / n . d with n = (v1 - v0) x (v2 - v0), whose
     // differences are fresh: their size is the triangle's, not the distance's.
-    RTC_REAL fx = rtc_real_shifted(rtc_real_difference(p1.x, p0.x), m_scale);
-    RTC_REAL fy = rtc_real_shifted(rtc_real_difference(p1.y, p0.y), m_scale);
-    RTC_REAL fz = rtc_real_shifted(rtc_real_difference(p1.z, p0.z), m_scale);
-    RTC_REAL gx = rtc_real_shifted(rtc_real_difference(p2.x, p0.x), m_scale);
-    RTC_REAL gy = rtc_real_shifted(rtc_real_difference(p2.y, p0.y), m_scale);
-    RTC_REAL gz = rtc_real_shifted(rtc_real_difference(p2.z, p0.z), m_scale);
-    RTC_REAL nx = rtc_real_minor(fy, gz, fz, gy);
-    RTC_REAL ny = rtc_real_minor(fz, gx, fx, gz);
-    RTC_REAL nz = rtc_real_minor(fx, gy, fy, gx);
-    RTC_REAL above = rtc_real_sum(
-        rtc_real_sum(rtc_real_product(nx, ax), rtc_real_product(ny, ay)), rtc_real_product(nz, az));
-    RTC_REAL below = rtc_real_sum(rtc_real_sum(rtc_real_scaled(nx, dx), rtc_real_scaled(ny, dy)),
-                                  rtc_real_scaled(nz, dz));
+    RTC_REAL fx = rtc_real_shifted(rtc_real_difference(p1.x, p0.x), scaled.m_scale);
+    RTC_REAL fy = rtc_real_shifted(rtc_real_difference(p1.y, p0.y), scaled.m_scale);
+    RTC_REAL fz = rtc_real_shifted(rtc_real_difference(p1.z, p0.z), scaled.m_scale);
+    RTC_REAL gx = rtc_real_shifted(rtc_real_difference(p2.x, p0.x), scaled.m_scale);
+    RTC_REAL gy = rtc_real_shifted(rtc_real_difference(p2.y, p0.y), scaled.m_scale);
+    RTC_REAL gz = rtc_real_shifted(rtc_real_difference(p2.z, p0.z), scaled.m_scale);
     // A minor and a dot product are off by at most 2 + 3 operations' errors
     // of the sum of all magnitudes: less than 2^-40 of it for pairs, 2^-49
     // for doubles. RTC_REAL_DIGITS, 2^-14 or 2^-24, asks that both be above
     // 2^26 or 2^25 of that error, so that t is off by less than an ulp.
-    float ux = float(rtc_real_size(fy) * rtc_real_size(gz) + rtc_real_size(fz) * rtc_real_size(gy));
-    float uy = float(rtc_real_size(fz) * rtc_real_size(gx) + rtc_real_size(fx) * rtc_real_size(gz));
-    float uz = float(rtc_real_size(fx) * rtc_real_size(gy) + rtc_real_size(fy) * rtc_real_size(gx));
-    float above_size = (ux * float(rtc_real_size(ax)) + uy * float(rtc_real_size(ay))) +
-                       uz * float(rtc_real_size(az));
-    float below_size = (ux * abs(dx) + uy * abs(dy)) + uz * abs(dz);
+    RTC_REAL n = rtc_real_minor(fy, gz, fz, gy);
+    float size = float(rtc_real_size(fy) * rtc_real_size(gz) + rtc_real_size(fz) * rtc_real_size(gy));
+    RTC_REAL a = rtc_real_shifted(rtc_real_difference(p0.x, o.x), scaled.m_scale);
+    RTC_REAL above = rtc_real_product(n, a), below = rtc_real_scaled(n, way.x);
+    float above_size = size * float(rtc_real_size(a)), below_size = size * abs(way.x);
+    n = rtc_real_minor(fz, gx, fx, gz);
+    size = float(rtc_real_size(fz) * rtc_real_size(gx) + rtc_real_size(fx) * rtc_real_size(gz));
+    a = rtc_real_shifted(rtc_real_difference(p0.y, o.y), scaled.m_scale);
+    above = rtc_real_sum(above, rtc_real_product(n, a));
+    below = rtc_real_sum(below, rtc_real_scaled(n, way.y));
+    above_size += size * float(rtc_real_size(a));
+    below_size += size * abs(way.y);
+    n = rtc_real_minor(fx, gy, fy, gx);
+    size = float(rtc_real_size(fx) * rtc_real_size(gy) + rtc_real_size(fy) * rtc_real_size(gx));
+    a = rtc_real_shifted(rtc_real_difference(p0.z, o.z), scaled.m_scale);
+    above = rtc_real_sum(above, rtc_real_product(n, a));
+    below = rtc_real_sum(below, rtc_real_scaled(n, way.z));
+    above_size += size * float(rtc_real_size(a));
+    below_size += size * abs(way.z);
     float limit = float(RTC_REAL_DIGITS);
-    float n = rtc_real_float(above), k = rtc_real_float(below);
-    sound = sound && below_size > 7.888609e-31 && abs(k) > limit * below_size; // 2^-100
+    float numerator = rtc_real_float(above), k = rtc_real_float(below);
+    sound = scaled.sound && below_size > 7.888609e-31 && abs(k) > limit * below_size; // 2^-100
     // Behind the origin, however short of digits: common for rays that start on a surface.
     float slack = limit * limit * above_size;
-    result.behind = sound && (k > 0.0 ? n : -n) < -slack;
-    result.sound = sound && above_size > 7.888609e-31 && abs(n) > limit * above_size;
-    result.t = rtc_ldexp(rtc_real_quotient(above, below), m_exponent - d_exponent);
-    return result;
+    behind = sound && (k > 0.0 ? numerator : -numerator) < -slack;
+    sound = sound && above_size > 7.888609e-31 && abs(numerator) > limit * above_size;
+    return rtc_ldexp(rtc_real_quotient(above, below), scaled.m_exponent - scaled.d_exponent);
 }
 
 // Stage 1: RTC_FILTER_*. `front` as rtc_exact_triangle has it. The exact t of a hit lies between low and high.

@@ -1,23 +1,26 @@
 // Tier `exact`, stages 2 and 3: the undecided triangle under the cursor, and at the end of the walk t and weights of
 // the committed one.
 //
-// One loop with one place for each thing that is done: reading a triangle and its ray, stage 2, a determinant. Drivers
+// One loop with one place for each thing that is done: reading a triangle and its ray, an edge or t in stage 2, a
+// determinant. Drivers
 // copy functions to where they are called; some run code whose lanes are all off (lavapipe 22.3); and the second turn
 // is rare.
-const uint RTC_JOB_STAGE2 = 0u;
-const uint RTC_JOB_EDGES = 1u; // and 8 more: three attempts at each of three edges
-const uint RTC_JOB_T = 10u; // t's numerator and denominator
-const uint RTC_JOB_SAME = 12u; // the committed triangle, then the candidate: the same?
-const uint RTC_JOB_ORDER = 14u; // the candidate's numerator and denominator, then what it is compared with
-const uint RTC_JOB_DONE = 18u;
+const uint RTC_JOB_T2 = 0u; // t and weights in stage 2; at the end of the walk that is all, nearly always
+const uint RTC_JOB_EDGES2 = 1u; // and 2 more: edges in stage 2
+const uint RTC_JOB_EDGES = 4u; // and 8 more: three attempts at each of three edges
+const uint RTC_JOB_T = 13u; // t's numerator and denominator
+const uint RTC_JOB_SAME = 15u; // the committed triangle, then the candidate: the same?
+const uint RTC_JOB_ORDER = 17u; // the candidate's numerator and denominator, then what it is compared with
+const uint RTC_JOB_DONE = 21u;
+const uint RTC_JOB_NONE = 22u;
 
 int rtc_least(ivec3 v) { return min(v.x, min(v.y, v.z)); }
 int rtc_most(ivec3 v) { return max(v.x, max(v.y, v.z)); }
 
-// The first edge whose side is not known, as a job; 0: none.
+// The first edge whose side is not known, as a job.
 uint rtc_open_edge(ivec3 side) {
     uint edge = side.x == 0 ? 0u : (side.y == 0 ? 1u : 2u);
-    return side.x != 0 && side.y != 0 && side.z != 0 ? 0u : RTC_JOB_EDGES + 3u * edge;
+    return side.x != 0 && side.y != 0 && side.z != 0 ? RTC_JOB_NONE : RTC_JOB_EDGES + 3u * edge;
 }
 
 // Five vectors in what determinants use afterwards, and whether five others are the same.
@@ -46,17 +49,19 @@ uint rtc_settle(uint result) {
     uint instance = last ? rtc_hit_instance : rtc_trav_instance;
     bool committed = rtc_hit_instance != RTC_NONE && rtc_hit_slot != RTC_NONE; // a triangle
     uint primitive = 0u, flags = 0u;
-    RtcStage2 found;
-    found.side = ivec3(0);
-    found.t = 0.0;
-    found.b1 = 0.0;
-    found.b2 = 0.0;
-    found.sound = false;
-    found.behind = false;
+    ivec3 side = ivec3(last ? 1 : 0); // 0: not known
+    float t = 0.0;
+    vec2 weights = vec2(0.0);
+    bool sound = false; // t is known
     vec2 above = vec2(0.0); // of t's numerator
     bool hit = false, upwards = false;
     bool against_min = false, against_max = false; // what t is still to be compared with
-    uint job = RTC_JOB_STAGE2;
+    uint job = RTC_JOB_T2;
+    rtc_make_level_again();
+    // Not kept while rays walk.
+    rtc_wide_sign = ivec4(0);
+    rtc_wide_low = uvec4(0u);
+    rtc_wide_high = uvec4(0u);
     [[dont_unroll]] do {
         bool other = job == RTC_JOB_SAME || (job >= RTC_JOB_ORDER + 2u && committed && !against_min);
         uint at_instance = other ? rtc_hit_instance : instance;
@@ -78,17 +83,32 @@ uint rtc_settle(uint result) {
         uvec3 p0 = rtc_bits(v0), p1 = rtc_bits(v1), p2 = rtc_bits(v2), origin = rtc_bits(o), way = rtc_bits(d);
         bool edges_known = false, t_known = false, ordered = false;
         int order = 0;
-        if (job == RTC_JOB_STAGE2) {
-            primitive = q0.w;
-            flags = q1.w;
-            upwards = d.z > 0.0;
-            found = rtc_stage2(v0, v1, v2, o, d, last);
-            // Infinite vertices have no exact answer: missed.
-            vec3 far = max(max(abs(v0), abs(v1)), abs(v2));
-            bool finite = rtc_finite(far.x) && rtc_finite(far.y) && rtc_finite(far.z);
-            hit = finite && !found.behind && !(rtc_least(found.side) < 0 && rtc_most(found.side) > 0);
-            job = hit ? rtc_open_edge(found.side) : RTC_JOB_DONE;
-            edges_known = job == RTC_JOB_STAGE2;
+        if (job < RTC_JOB_EDGES) {
+            RtcStage2 scaled = rtc_stage2(v0, v1, v2, o, d);
+            if (job == RTC_JOB_T2) {
+                primitive = q0.w;
+                flags = q1.w;
+                upwards = d.z > 0.0;
+                bool behind;
+                weights = rtc_stage2_weights(scaled, v0, v1, v2, o, d);
+                t = rtc_stage2_t(scaled, v0, v1, v2, o, d, sound, behind);
+                // Infinite vertices have no exact answer: missed.
+                vec3 far = max(max(abs(v0), abs(v1)), abs(v2));
+                hit = rtc_finite(far.x) && rtc_finite(far.y) && rtc_finite(far.z) && !behind;
+                job = hit ? (last ? RTC_JOB_EDGES : RTC_JOB_EDGES2) : RTC_JOB_DONE;
+            } else {
+                bvec2 is = equal(uvec2(job), uvec2(RTC_JOB_EDGES2, RTC_JOB_EDGES2 + 1u));
+                vec3 b = mix(mix(v0, v2, bvec3(is.y)), v1, bvec3(is.x));
+                vec3 c = mix(mix(v1, v0, bvec3(is.y)), v2, bvec3(is.x));
+                int s = rtc_stage2_edge(scaled, b, c, o, d);
+                side = mix(side, ivec3(s), bvec3(is.x, is.y, !is.x && !is.y));
+                hit = !(rtc_least(side) < 0 && rtc_most(side) > 0);
+                job = hit ? job + 1u : RTC_JOB_DONE;
+            }
+            if (job == RTC_JOB_EDGES) {
+                job = rtc_open_edge(side);
+                edges_known = job == RTC_JOB_NONE;
+            }
         } else if (job == RTC_JOB_SAME) {
             rtc_note(p0, p1, p2, origin, way);
             job++;
@@ -133,16 +153,24 @@ uint rtc_settle(uint result) {
                 y2 = none;
                 z2 = none;
             }
-            rtc_wide_det(which, x1, x2, y1, y2, z1, z2);
+            rtc_wide_set(0u, x1);
+            rtc_wide_set(3u, x2);
+            rtc_wide_set(6u, y1);
+            rtc_wide_set(9u, y2);
+            rtc_wide_set(12u, z1);
+            rtc_wide_set(15u, z2);
+            uint bottom = rtc_wide_bottom_scale(x1, x2) + rtc_wide_bottom_scale(y1, y2) + rtc_wide_bottom_scale(z1, z2);
+            uint top = rtc_wide_top_scale(x1, x2) + rtc_wide_top_scale(y1, y2) + rtc_wide_top_scale(z1, z2);
+            rtc_wide_det(which, bottom, top, rtc_wide_top_scale(x2, x2) == 0u);
             if (edges) {
-                int side = (attempt == 0u) == (d.z > 0.0) ? rtc_wide_sign.x : -rtc_wide_sign.x;
-                found.side = mix(found.side, ivec3(side), equal(uvec3(edge), uvec3(0u, 1u, 2u)));
+                int s = (attempt == 0u) == (d.z > 0.0) ? rtc_wide_sign.x : -rtc_wide_sign.x;
+                side = mix(side, ivec3(s), equal(uvec3(edge), uvec3(0u, 1u, 2u)));
                 // 0 in all three attempts: the edge is a point, there is no area.
-                hit = (side != 0 || attempt < 2u) && !(rtc_least(found.side) < 0 && rtc_most(found.side) > 0);
-                job = hit ? (side != 0 ? rtc_open_edge(found.side) : job + 1u) : RTC_JOB_DONE;
-                edges_known = job == RTC_JOB_STAGE2;
+                hit = (s != 0 || attempt < 2u) && !(rtc_least(side) < 0 && rtc_most(side) > 0);
+                job = hit ? (s != 0 ? rtc_open_edge(side) : job + 1u) : RTC_JOB_DONE;
+                edges_known = job == RTC_JOB_NONE;
             } else if (job == RTC_JOB_T + 1u) {
-                found.t = rtc_wide_quotient(above);
+                t = rtc_wide_quotient(above);
                 t_known = true;
             } else {
                 above = rtc_wide_leading;
@@ -155,15 +183,15 @@ uint rtc_settle(uint result) {
         }
         // What is known now, and what is to be asked next.
         if (edges_known) {
-            t_known = found.sound;
+            t_known = sound;
             job = RTC_JOB_T;
         }
         bool next = t_known || ordered;
         if (t_known && !last) {
-            bool before = found.t < rtc_trav_low * (1.0 - RTC_EXACT_TIE);
-            against_min = rtc_tied(found.t, rtc_trav_tmin);
-            against_max = !before && found.t <= rtc_trav_tmax * (1.0 + RTC_EXACT_TIE);
-            hit = (against_min || found.t > rtc_trav_tmin) && (against_max || before);
+            bool before = t < rtc_trav_low * (1.0 - RTC_EXACT_TIE);
+            against_min = rtc_tied(t, rtc_trav_tmin);
+            against_max = !before && t <= rtc_trav_tmax * (1.0 + RTC_EXACT_TIE);
+            hit = (against_min || t > rtc_trav_tmin) && (against_max || before);
         } else if (ordered && against_min) {
             hit = order > 0;
             against_min = false;
@@ -180,15 +208,15 @@ uint rtc_settle(uint result) {
         rtc_turns++;
     } while (job != RTC_JOB_DONE);
     if (last) {
-        rtc_trav_tmax = found.t;
-        rtc_trav_low = found.t;
-        rtc_hit_attr0 = floatBitsToUint(found.b1);
-        rtc_hit_attr1 = floatBitsToUint(found.b2);
+        rtc_trav_tmax = t;
+        rtc_trav_low = t;
+        rtc_hit_attr0 = floatBitsToUint(weights.x);
+        rtc_hit_attr1 = floatBitsToUint(weights.y);
     } else {
         result = RTC_STEP_RUNNING;
         if (hit) {
-            bool front = (found.side.x > 0) == upwards;
-            result = rtc_meet_triangle(slot, primitive, flags, found.t, found.b1, found.b2, front);
+            bool front = (side.x > 0) == upwards;
+            result = rtc_meet_triangle(slot, primitive, flags, t, weights.x, weights.y, front);
         }
     }
     return result;

@@ -112,12 +112,5 @@ void rtc_trace_restore(uint first_word) {
         rtc_stack_set(i, rtc_scratch_load(w + i));
         rtc_turns++;
     }
-    // The data of the level are made again, and then the walk goes on where it was. (A finished ray has none.)
-    if (rtc_trav_cur != RTC_REF_DONE) {
-        if (rtc_trav_cur != RTC_REF_POP) {
-            rtc_stack_set(rtc_sp(), rtc_trav_cur);
-            rtc_trav_word++;
-        }
-        rtc_trav_cur = RTC_REF_SETUP;
-    }
+    rtc_make_level_again(); // a finished ray has none
 }

@@ -2,7 +2,7 @@
 // on a root-to-leaf path, which builders keep at RTC_MAX_DEPTH: twice that
 // suffices for any tree they make. Anything deeper ends in a launch error.
 const uint RTC_STACK_ENTRIES = 2u * RTC_MAX_DEPTH;
-uint rtc_trav_stack[RTC_STACK_ENTRIES];
+uint rtc_trav_stack[RTC_STACK_ENTRIES + 1u]; // one more for rtc_make_level_again
 
 // The first RTC_SHARED_STACK entries of each lane, where a device likes that
 // better (lavapipe 22.3).

@@ -320,6 +320,27 @@ uint rtc_next_slot() {
     return slot;
 }
 
+// The level's data need not be kept from here on: they are made again, and then the walk goes on where it was.
+void rtc_make_level_again() {
+    if (rtc_trav_cur != RTC_REF_DONE) {
+        if (rtc_trav_cur != RTC_REF_POP && rtc_trav_cur != RTC_REF_SETUP) {
+            rtc_stack_set(rtc_sp(), rtc_trav_cur);
+            rtc_trav_word++;
+        }
+        rtc_trav_cur = RTC_REF_SETUP;
+    }
+    // Said so, or compilers keep them.
+    rtc_trav_base = rtc_ray_root;
+    rtc_trav_slots = 0u;
+    rtc_trav_origin = vec3(0.0);
+    rtc_trav_direction = vec3(0.0);
+    rtc_trav_inverse = vec3(0.0);
+    rtc_trav_pad = 0.0;
+#ifndef RTC_TIER_FAST
+    rtc_trav_shear = vec3(0.0);
+#endif
+}
+
 #if defined(RTC_TIER_EXACT)
 #include "exact_walk.glsl"
 #include "exact_settle.glsl"
@@ -402,6 +423,7 @@ uint rtc_trace_step() {
 #elif defined(RTC_TIER_DEFERS)
         if (RTC_LINK_TRIANGLES && result == RTC_STEP_UNDECIDED) {
             result = rtc_settle_triangle(rtc_next_slot());
+            rtc_make_level_again();
         }
 #endif
         rtc_turns++;

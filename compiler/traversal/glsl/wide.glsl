@@ -26,8 +26,6 @@ uint rtc_mantissa(uint bits) {
 
 uint rtc_scale(uint bits) { return max((bits >> 23u) & 255u, 1u) - 1u; }
 
-uint rtc_pick(uvec3 v, uint i) { return mix(mix(v.z, v.y, i == 1u), v.x, i == 0u); }
-
 // accumulator += x y z, or -= where `negate` is the sign bit.
 void rtc_wide_add(uint base, uint x, uint y, uint z, uint negate) {
     uint mx = rtc_mantissa(x), my = rtc_mantissa(y), mz = rtc_mantissa(z);
@@ -67,20 +65,28 @@ uint rtc_wide_bottom_scale(uvec3 a, uvec3 b) {
     return min(min(min(low, rtc_wide_scale(b.x)), rtc_wide_scale(b.y)), rtc_wide_scale(b.z));
 }
 
-// det(x1 - x2, y1 - y2, z1 - z2), bits of floats, into an accumulator, where
+// What a determinant is made of, bits of floats: x1, x2, y1, y2, z1, z2. In an array, for the sake of the registers
+// that everything that settles a triangle would need.
+uint rtc_wide_operand[18];
+
+void rtc_wide_set(uint at, uvec3 v) {
+    rtc_wide_operand[at] = v.x;
+    rtc_wide_operand[at + 1u] = v.y;
+    rtc_wide_operand[at + 2u] = v.z;
+}
+
+// det(x1 - x2, y1 - y2, z1 - z2) into an accumulator, where
 // at least two of x2, y2, z2 are equal or all but one 0, so that a
 // determinant with two of them is 0: four choices of vectors times six
-// permutations, one a turn. Limbs are left as magnitude.
-void rtc_wide_det(uint which, uvec3 x1, uvec3 x2, uvec3 y1, uvec3 y2, uvec3 z1, uvec3 z2) {
+// permutations, one a turn. Limbs are left as magnitude. Each vector's smallest and largest scale come along.
+void rtc_wide_det(uint which, uint bottom, uint top, bool x2_zero) {
     uint base = which * RTC_WIDE_LIMBS;
-    uint bottom = rtc_wide_bottom_scale(x1, x2) + rtc_wide_bottom_scale(y1, y2) + rtc_wide_bottom_scale(z1, z2);
-    uint top = rtc_wide_top_scale(x1, x2) + rtc_wide_top_scale(y1, y2) + rtc_wide_top_scale(z1, z2);
     bottom = min(bottom, top) / 24u;
     top = top / 24u + 5u; // four limbs of a product, and carries
     [[dont_unroll]] for (uint i = bottom; i <= top; ++i) {
         rtc_wide[base + i] = 0;
     }
-    uint turns = rtc_wide_top_scale(x2, x2) == 0u ? 18u : 24u; // x2 is 0 but for t's numerator
+    uint turns = x2_zero ? 18u : 24u; // but for t's numerator
     [[dont_unroll]] for (uint i = 0u; i < turns; ++i) {
         uint choice = i / 6u;
         uint p = (i >> 1u) - 3u * choice;
@@ -88,9 +94,9 @@ void rtc_wide_det(uint which, uvec3 x1, uvec3 x2, uvec3 y1, uvec3 y2, uvec3 z1, 
         uint next = p == 2u ? 0u : p + 1u;
         uint last = p == 0u ? 2u : p - 1u;
         uint negate = (choice == 0u) == swapped ? 0x80000000u : 0u;
-        uint x = rtc_pick(mix(x1, x2, bvec3(choice == 3u)), p);
-        uint y = rtc_pick(mix(y1, y2, bvec3(choice == 1u)), swapped ? last : next);
-        uint z = rtc_pick(mix(z1, z2, bvec3(choice == 2u)), swapped ? next : last);
+        uint x = rtc_wide_operand[p + (choice == 3u ? 3u : 0u)];
+        uint y = rtc_wide_operand[(swapped ? last : next) + (choice == 1u ? 9u : 6u)];
+        uint z = rtc_wide_operand[(swapped ? next : last) + (choice == 2u ? 15u : 12u)];
         rtc_wide_add(base, x, y, z, negate);
     }
     // Carries; the last one tells the sign. A negative number's limbs are its
