@@ -57,6 +57,76 @@ TEST_P(EachTier, ReportsEverythingAboutAHit) {
     EXPECT_EQ(hit.mismatches, 0u);
 }
 
+// Edges and vertices are what floats leave open: decided after the walk's loop, which then goes on. Two sheets, so that
+// every ray meets such a triangle twice; four triangles a leaf.
+TEST_F(LabTest, HitsOnEdgesLieWhereTheyAreMet) {
+    auto height = [](float px, float py) { return 0.5f * px + 0.25f * py; };
+    Blas blas;
+    blas.geometries.resize(1);
+    std::vector<Triangle>& triangles = blas.geometries[0].triangles;
+    for (float sheet : {0.0f, -4.0f})
+        for (int x = 0; x < 4; ++x)
+            for (int y = 0; y < 4; ++y) {
+                auto at = [&](int i, int j) {
+                    const float px = float(x + i), py = float(y + j);
+                    return Vec3{px, py, height(px, py) + sheet};
+                };
+                triangles.push_back({at(0, 0), at(1, 0), at(1, 1)});
+                triangles.push_back({at(0, 0), at(1, 1), at(0, 1)});
+            }
+    std::vector<Ray> rays;
+    for (int x = 1; x < 16; ++x)
+        for (int y = 1; y < 16; ++y)
+            for (float direction : {-1.0f, 1.0f})
+                rays.push_back(make_ray({0.25f * float(x), 0.25f * float(y), -8 * direction}, {0, 0, direction}));
+    for (const Variant variant : {Variant::Watertight, Variant::Exact}) {
+        for (const bool opaque : {true, false}) {
+            blas.geometries[0].opaque = opaque;
+            TracerOptions options;
+            options.variant = variant;
+            options.aabbs = false;
+            options.any_hit = options.resumable = !opaque;
+            DeviceTracer tracer(test_context(), options);
+            tracer.set_scene(build_scene({blas}, {{}}));
+            for (Ray& ray : rays) ray.sbt = opaque ? 0u : uint32_t(kIgnore);
+            const std::vector<RayResult> hits = tracer.trace(rays);
+            for (size_t i = 0; i < rays.size(); ++i) {
+                const Vec3 o = rays[i].origin;
+                const RayResult& hit = hits[i];
+                SCOPED_TRACE(testing::Message() << variant_name(variant) << " at " << o.x << ' ' << o.y << ' ' << o.z);
+                if (!opaque) {
+                    EXPECT_EQ(hit.front + hit.back, 2u);
+                    continue;
+                }
+                ASSERT_NE(hit.instance, kNoInstance);
+                EXPECT_EQ(hit.t, o.z > 0 ? o.z - height(o.x, o.y) : height(o.x, o.y) - 4 - o.z);
+                const Triangle& v = triangles[hit.primitive];
+                const float b1 = std::bit_cast<float>(hit.attr0), b2 = std::bit_cast<float>(hit.attr1);
+                EXPECT_FLOAT_EQ(v[0].x + b1 * (v[1].x - v[0].x) + b2 * (v[2].x - v[0].x), o.x);
+                EXPECT_FLOAT_EQ(v[0].y + b1 * (v[1].y - v[0].y) + b2 * (v[2].y - v[0].y), o.y);
+                EXPECT_EQ(hit.kind, o.z > 0 ? 0xfeu : 0xffu);
+            }
+        }
+    }
+}
+
+// A triangle beside a report at nearly its t: the smaller one counts, whichever comes first in the walk.
+TEST_F(LabTest, ExactTrianglesAreComparedWithReports) {
+    for (const bool triangle_first : {true, false}) {
+        const HostScene scene = build_scene({triangle_blas(), box_blas()}, {Instance{.blas = triangle_first ? 0u : 1u},
+                                                                           Instance{.blas = triangle_first ? 1u : 0u}});
+        for (const float reported : {std::nextafter(2.0f, 0.0f), 2.0f, std::nextafter(2.0f, 3.0f)}) {
+            Ray ray = make_ray({0.25f, 0.5f, 2}, {0, 0, -1});
+            ray.report_t = reported;
+            const RayResult hit = trace_one(scene, ray, Variant::Exact);
+            const uint32_t triangle = triangle_first ? 0u : 1u;
+            const uint32_t expected = reported < 2 ? 1 - triangle : (reported > 2 ? triangle : 0u);
+            EXPECT_EQ(hit.instance, expected) << reported << ' ' << triangle_first;
+            EXPECT_EQ(hit.t, std::min(reported, 2.0f));
+        }
+    }
+}
+
 TEST_P(EachTier, MissLeavesTheOperand) {
     const RayResult miss = trace_one(build_scene({triangle_blas()}, {{}}),
                                      make_ray({2, 2, 3}, {0, 0, -1}, 0.5f, 77), GetParam());
