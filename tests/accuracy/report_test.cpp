@@ -8,6 +8,7 @@
 
 #include "cases.h"
 #include "embree_tracer.h"
+#include "image_file.h"
 #include "leaks.h"
 #include "meshes.h"
 
@@ -201,6 +202,31 @@ TEST(Report, NoiseDominatesNobody) {
     Json a = full("fast", 300), b = full("watertight", 310);
     for (Json& row : b["cost"]) row["seconds"] = 0.99e-3;
     EXPECT_TRUE(dominated(summarise({run("a", {a, b})}).at(0).subjects).empty());
+    // Nor does one of which only the cost is known.
+    Json cheap{{"tier", "native"}, {"cost", cost(1e-4, 0.1)}};
+    EXPECT_TRUE(dominated(summarise({run("a", {a, cheap})}).at(0).subjects).empty());
+}
+
+TEST(Report, PictureAsPng) {
+    const std::string path = testing::TempDir() + "rtc_plot.png";
+    write_plot_png(example(), path);
+    const tools::Picture picture = tools::read_picture(path, false);
+    const std::string svg = plot_svg(example());
+    EXPECT_EQ(picture.width, 2 * uint32_t(std::atof(svg.c_str() + svg.find("width=\"") + 7)));
+    // The colours of three subjects and of the letters are there.
+    auto pixels_of = [&](int r, int g, int b) {
+        size_t count = 0;
+        for (uint32_t y = 0; y < picture.height; ++y)
+            for (uint32_t x = 0; x < picture.width; ++x) {
+                const float* p = picture.at(x, y);
+                count += std::fabs(p[0] * 255 - r) + std::fabs(p[1] * 255 - g) + std::fabs(p[2] * 255 - b) < 60;  // edges are blended
+            }
+        return count;
+    };
+    EXPECT_GT(pixels_of(0xd9, 0x5f, 0x02), 40u) << "fast";
+    EXPECT_GT(pixels_of(0xe7, 0x29, 0x8a), 40u) << "native";
+    EXPECT_GT(pixels_of(0x1b, 0x9e, 0x77), 10u) << "watertight, hollow";
+    EXPECT_GT(pixels_of(0x22, 0x22, 0x22), 1000u) << "letters";
 }
 
 TEST(Embree, SeesWhatRtcSees) {

@@ -9,6 +9,7 @@
 #include "commands.h"
 #include "error.h"
 #include "experiments.h"
+#include "image_file.h"
 #include "pipeline_tracer.h"
 #include "transform_error.h"
 
@@ -123,7 +124,8 @@ int agree_command(int argc, char** argv) {
         throw tools::Error("--addressing and --leaks go with --pipeline");
     for (const std::string& axis : settings.axes) exact_cases(axis);  // names what is wrong before anything runs
 
-    for (const std::string& path : {json_path, markdown_path}) require_writable(path);
+    for (const std::string& path : {json_path, markdown_path})
+        if (!path.empty()) tools::require_writable(path);
     tools::ContextOptions context_options;
     context_options.device = device;
     context_options.validate = validate;

@@ -9,6 +9,7 @@
 #include "command_line.h"
 #include "commands.h"
 #include "error.h"
+#include "image_file.h"
 
 namespace rtc::lab {
 namespace {
@@ -186,7 +187,8 @@ int campaign_command(CampaignProgram program, int argc, char** argv) {
     const char* name = leaks ? "rtc-accuracy leaks" : "rtc-accuracy spawn";
     if (const int status = tools::parse_command_line(app, name, argc, argv); status >= 0) return status;
 
-    for (const std::string& path : {json_path, markdown_path}) require_writable(path);
+    for (const std::string& path : {json_path, markdown_path})
+        if (!path.empty()) tools::require_writable(path);
     const std::vector<CampaignPoint> within = leaks ? campaign_points(false) : spawn_points();
     const std::vector<CampaignPoint> beyond = settings.beyond ? campaign_points(true) : std::vector<CampaignPoint>();
     std::string text;

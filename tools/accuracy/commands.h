@@ -20,8 +20,6 @@ int measure_command(int argc, char** argv);
 // 95 % bound on a rate of which `events` were seen in `n`: the rule of three when none was, else about two
 // standard deviations up.
 double upper_bound(uint64_t events, uint64_t n);
-// Before anything is measured: throws tools::Error where `path`, if not empty, cannot be written.
-void require_writable(const std::string& path);
 // For CLI options: 1 to 10^15 rays, negative numbers being refused rather than taken for huge ones; 0 as well.
 inline CLI::Validator some_rays() { return tools::number_between(1, 1e15); }
 inline CLI::Validator rays_or_none() { return tools::number_between(0, 1e15); }

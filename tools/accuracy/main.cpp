@@ -7,10 +7,6 @@
 
 double rtc::lab::upper_bound(uint64_t events, uint64_t n) { return Rate{events, n}.bound(); }
 
-void rtc::lab::require_writable(const std::string& path) {
-    if (!path.empty() && !std::ofstream(path, std::ios::binary | std::ios::app)) throw rtc::tools::Error("cannot write " + path);
-}
-
 void rtc::lab::write_file(const std::string& path, const std::string& text) {
     std::ofstream file(path, std::ios::binary);
     file << text;

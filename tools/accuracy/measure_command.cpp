@@ -13,6 +13,7 @@
 #include "embree_tracer.h"
 #include "error.h"
 #include "experiments.h"
+#include "image_file.h"
 #include "native_tracer.h"
 #include "payloads.h"
 #include "report.h"
@@ -319,7 +320,7 @@ int measure_command(int argc, char** argv) {
     app.add_option("--repeats", settings.repeats, "times that the cost is measured, in turns")->check(tools::number_between(1, 1e6));
     app.add_option("--json", json_path, "write all figures");
     app.add_option("--markdown", markdown_path, "write the table");
-    app.add_option("--plot", plot_path, "write cost against error as SVG");
+    app.add_option("--plot", plot_path, "write cost against error as .svg or .png");
     app.add_flag("--validate", settings.validate, "run under the validation layers");
     app.add_flag("--while-while", settings.while_while, "inner loop over nodes");
     app.add_flag("--storage-fetch", settings.storage, "fetch nodes from a storage buffer");
@@ -335,9 +336,10 @@ int measure_command(int argc, char** argv) {
             for (const std::string& name : axis_names()) known += name + ", ";
             throw Error("unknown axis \"" + axis + "\": one of " + known + "all or none");
         }
-    if (!plot_path.empty() && !plot_path.ends_with(".svg"))
-        throw Error("--plot writes SVG: \"" + plot_path + "\" does not end in .svg");
-    for (const std::string& path : {json_path, markdown_path, plot_path}) require_writable(path);
+    if (!plot_path.empty() && !plot_path.ends_with(".svg") && !plot_path.ends_with(".png"))
+        throw Error("--plot: \"" + plot_path + "\" ends neither in .svg nor in .png");
+    for (const std::string& path : {json_path, markdown_path, plot_path})
+        if (!path.empty()) tools::require_writable(path);
     for (const std::string& tier : tiers)
         if (std::find(kAll.begin(), kAll.end(), tier) == kAll.end()) {
             std::string known;
@@ -421,7 +423,8 @@ int measure_command(int argc, char** argv) {
     const std::string table = markdown_table(summary, "") + "\n" + knob_table(summary);
     std::fputs(table.c_str(), stdout);
     if (!markdown_path.empty()) write_file(markdown_path, table);
-    if (!plot_path.empty()) write_file(plot_path, plot_svg(summary));
+    if (plot_path.ends_with(".svg")) write_file(plot_path, plot_svg(summary));
+    if (plot_path.ends_with(".png")) write_plot_png(summary, plot_path);
     if (!json_path.empty()) write_file(json_path, lines_of(json));
     for (const auto& subject : subjects)
         if (subject && subject->context() && subject->context()->validating()) subject->context()->require_silent_validation();

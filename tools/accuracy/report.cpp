@@ -126,7 +126,9 @@ int compare(const Rate& a, const Rate& b) {
     return a.rate() < b.rate() ? -1 : 1;
 }
 
+// An error that was measured of b alone keeps a from beating it.
 bool beats(const Summary& a, const Summary& b, bool with_bytes) {
+    if ((b.aimed().measured() && !a.aimed().measured()) || (b.first_hits.measured() && !a.first_hits.measured())) return false;
     auto t = [](const Summary& s) { return std::min(s.t_p999, 64.0); };  // no histogram goes further
     const int errors[] = {compare(a.aimed(), b.aimed()),
                           compare(a.insides, b.insides),
@@ -294,7 +296,7 @@ std::string markdown_table(const DeviceReport& report, const std::string& plot) 
     out += '\n' + axis_table(report);
     if (!report.subjects.empty()) {
         const Summary& s = report.subjects[0];
-        out += "Rays of a line: " + grouped(s.insides.rays) + " aimed inside, " + grouped(s.edges.rays) + " at edges, " +
+        out += "Rays of the first line (others may have had time for fewer): " + grouped(s.insides.rays) + " aimed inside, " + grouped(s.edges.rays) + " at edges, " +
                grouped(s.vertices.rays) + " at vertices, " + grouped(s.beyond.rays) + " beyond, " + grouped(s.first_hits.rays) +
                " for first hits, " + grouped(s.ordinary.differ.rays) + " ordinary ones. Time is " + (report.by_cpu ? "CPU time of all cores" : "the device's clock") + ".";
         const std::string names = joined(dominated(report.subjects));

@@ -83,6 +83,9 @@ std::string markdown_table(const DeviceReport& report, const std::string& plot);
 // Cost against error: three panels (unbalanced rays, first hits, t). SVG 1.1, no scripts, no external fonts.
 std::string plot_svg(const DeviceReport& report);
 
+// The same as PNG. Throws tools::Error.
+void write_plot_png(const DeviceReport& report, const std::string& path);
+
 // Whether fresh runs agree with the checked-in ones of the same devices.
 struct Tolerances {
     double cost = 0.15;    // of a ratio of times
