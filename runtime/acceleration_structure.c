@@ -112,13 +112,15 @@ VkResult rtr_check_geometry(RtrDevice d, const VkGeometryNV* g, unsigned index, 
 static VkResult check_flags(RtrDevice d, VkBuildAccelerationStructureFlagsNV flags) {
     const VkBuildAccelerationStructureFlagsNV fast = VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_TRACE_BIT_NV |
                                                      VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_BUILD_BIT_NV;
+    /* ALLOW_DATA_ACCESS of VK_KHR_ray_tracing_position_fetch, which older headers lack: always granted. */
+    const VkBuildAccelerationStructureFlagsNV data_access = 0x800;
     const VkBuildAccelerationStructureFlagsNV known =
-        fast | VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV |
+        fast | data_access | VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_NV |
         VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_COMPACTION_BIT_NV | VK_BUILD_ACCELERATION_STRUCTURE_LOW_MEMORY_BIT_NV;
     if (!(flags & ~known) && (flags & fast) != fast) return VK_SUCCESS;
     return rtr_error(d, VK_ERROR_VALIDATION_FAILED_EXT, "build-flags",
                      "acceleration structure: build flags 0x%x; PREFER_FAST_TRACE and PREFER_FAST_BUILD exclude each "
-                     "other, and flags beyond those of VK_NV_ray_tracing are not known",
+                     "other, and flags beyond those of VK_NV_ray_tracing and ALLOW_DATA_ACCESS are not known",
                      flags);
 }
 
