@@ -80,6 +80,33 @@ INSTANTIATE_TEST_SUITE_P(Tiers, Exact,
                                     (info.param.second ? "_with_aabbs" : "_triangles_only");
                          });
 
+// An origin between 2^-126 and 2^-125 along every axis is no origin of 0, though its exponent is the least there is.
+TEST_P(Exact, OriginsOfTheLeastExponentCount) {
+    Geometry geometry;
+    geometry.triangles.push_back({Vec3{-0x1.33359p-124f, 0x1.178218p-124f, -0x1.6007cap-124f},
+                                  Vec3{-0x1.6007cap-124f, 0x1.33359p-124f, -0x1.178218p-124f},
+                                  Vec3{-0x1.178218p-124f, 0x1.6007cap-124f, -0x1.33359p-124f}});
+    Blas blas;
+    blas.geometries.push_back(geometry);
+    const HostScene scene = build_scene({blas}, {Instance{}}, {});
+    TracerOptions options;
+    options.variant = GetParam().first;
+    options.aabbs = options.any_hit = GetParam().second;
+    DeviceTracer tracer(test_context(), options);
+    tracer.set_scene(scene);
+    Ray ray{};
+    ray.origin = {-0x1.73492ep-126f, 0x1.b2f008p-126f, 0x1.4ab6d8p-126f};
+    ray.direction = {-0x1.03357ep-124f, 0x1.8cf31cp-125f, -0x1.6a2fcep-124f};
+    ray.tmin = 0;
+    ray.tmax = INFINITY;
+    ray.mask = 0xff;
+    const auto expected = first_hits(Oracle(scene), {ray});
+    const auto got = tracer.trace({ray});
+    ASSERT_TRUE(expected[0].has_value());
+    EXPECT_NE(got[0].instance, kNoInstance);
+    EXPECT_NEAR(double(got[0].t), expected[0]->t, 1e-6);
+}
+
 TEST_P(Exact, AgreesWithExactArithmeticOnEveryAxis) {
     const auto [variant, aabbs] = GetParam();
     TracerOptions options;

@@ -161,7 +161,7 @@ uint rtc_settle(uint result) {
             rtc_wide_set(15u, z2);
             uint bottom = rtc_wide_bottom_scale(x1, x2) + rtc_wide_bottom_scale(y1, y2) + rtc_wide_bottom_scale(z1, z2);
             uint top = rtc_wide_top_scale(x1, x2) + rtc_wide_top_scale(y1, y2) + rtc_wide_top_scale(z1, z2);
-            rtc_wide_det(which, bottom, top, rtc_wide_top_scale(x2, x2) == 0u);
+            rtc_wide_det(which, bottom, top, ((x2.x | x2.y | x2.z) << 1u) == 0u);
             if (edges) {
                 int s = (attempt == 0u) == (d.z > 0.0) ? rtc_wide_sign.x : -rtc_wide_sign.x;
                 side = mix(side, ivec3(s), equal(uvec3(edge), uvec3(0u, 1u, 2u)));

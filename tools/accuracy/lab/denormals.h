@@ -14,8 +14,7 @@ bool is_denormal(float v);
 // Whether a denormal float has a part in what this ray hits: one in the ray's origin or
 // direction, in the ray of the object space of either
 // hit's instance or in what that is summed from, or in a vertex of the triangle that exact arithmetic or the device
-// hits; or where the way to the hit is one. (Other differences and products on the way that are denormal excuse nothing:
-// the tier must bear them.)
+// hits. (Differences and products on the way that are denormal excuse nothing: the tier must bear them.)
 bool denormals_at_stake(const HostScene& scene, const Ray& ray, const std::optional<OracleHit>& expected,
                         const RayResult& got);
 
