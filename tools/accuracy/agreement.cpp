@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <future>
 #include <limits>
+#include <optional>
 
 #include "cases.h"
 #include "denormals.h"
@@ -27,55 +28,59 @@ double ulp(double t) {
     return double(std::nextafter(f, std::numeric_limits<float>::infinity())) - double(f);
 }
 
-// Errors in steps of 1/64 ulp; more than 64 ulps share the last step but for the maximum.
-class Histogram {
+// Errors counted in steps.
+class Steps {
   public:
-    void add(double error) {
-        ++steps_[std::min<size_t>(size_t(error * 64), steps_.size() - 1)];
-        ++count_;
-    }
-    void add(const Histogram& more) {
+    explicit Steps(size_t steps) : steps_(steps) {}
+    void add(const Steps& more) {
         for (size_t i = 0; i < steps_.size(); ++i) steps_[i] += more.steps_[i];
         count_ += more.count_;
     }
-    double percentile(double p) const {
+
+  protected:
+    void count(size_t step) {
+        ++steps_[std::min(step, steps_.size() - 1)];
+        ++count_;
+    }
+    // The first step with that share of all at or below it; nothing when nothing was counted.
+    std::optional<size_t> reached(double p) const {
         uint64_t seen = 0;
         for (size_t i = 0; i < steps_.size(); ++i) {
             seen += steps_[i];
-            if (seen > 0 && double(seen) >= p * double(count_)) return double(i + 1) / 64;
+            if (seen > 0 && double(seen) >= p * double(count_)) return i;
         }
-        return 0;
+        return std::nullopt;
     }
 
   private:
-    std::vector<uint64_t> steps_ = std::vector<uint64_t>(64 * 64 + 1);
+    std::vector<uint64_t> steps_;
     uint64_t count_ = 0;
 };
 
-// Absolute errors in eight steps an octave, 2^-40 to 1.
-class FineHistogram {
+// Errors in steps of 1/64 ulp; more than 64 ulps share the last step but for the maximum.
+class Histogram : public Steps {
   public:
-    void add(double error) {
-        const double step = error > 0 ? std::ceil(8 * (std::log2(error) + 40)) : 0;
-        ++steps_[size_t(std::clamp(step, 0.0, double(steps_.size() - 1)))];
-        ++count_;
+    Histogram() : Steps(64 * 64 + 1) {}
+    using Steps::add;
+    void add(double error) { count(size_t(error * 64)); }
+    double percentile(double p) const {
+        const auto step = reached(p);
+        return step ? double(*step + 1) / 64 : 0;
     }
-    void add(const FineHistogram& more) {
-        for (size_t i = 0; i < steps_.size(); ++i) steps_[i] += more.steps_[i];
-        count_ += more.count_;
+};
+
+// Absolute errors in eight steps an octave, 2^-40 to 1.
+class FineHistogram : public Steps {
+  public:
+    FineHistogram() : Steps(8 * 40 + 1) {}
+    using Steps::add;
+    void add(double error) {
+        count(size_t(error > 0 ? std::clamp(std::ceil(8 * (std::log2(error) + 40)), 0.0, 8 * 40.0) : 0));
     }
     double percentile(double p) const {
-        uint64_t seen = 0;
-        for (size_t i = 0; i < steps_.size(); ++i) {
-            seen += steps_[i];
-            if (seen > 0 && double(seen) >= p * double(count_)) return i ? std::exp2(double(i) / 8 - 40) : 0;
-        }
-        return 0;
+        const auto step = reached(p);
+        return step && *step ? std::exp2(double(*step) / 8 - 40) : 0;
     }
-
-  private:
-    std::vector<uint64_t> steps_ = std::vector<uint64_t>(8 * 40 + 1);
-    uint64_t count_ = 0;
 };
 
 // The object-space ray as traversal has it.

@@ -9,36 +9,8 @@ class LargeTest : public StagesTest {
     static constexpr uint32_t kRays = 256;
 
     std::vector<uint32_t> trace(Scene& scene, RtrAccelerationStructure top) {
-        Buffer result = scene.upload(nullptr, 4 * kRays);
-        EXPECT_EQ(rtrUpdateAccelerationStructureDescriptors(rtr, set, 0, 0, 1, &top, nullptr), VK_SUCCESS);
-        VkDescriptorBufferInfo info{result.handle, 0, VK_WHOLE_SIZE};
-        VkWriteDescriptorSet w{VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET};
-        w.dstSet = set;
-        w.dstBinding = 1;
-        w.descriptorCount = 1;
-        w.descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
-        w.pBufferInfo = &info;
-        vk->UpdateDescriptorSets(vk->device, 1, &w, 0, nullptr);
-        RtrSbtRecord raygen{0, 0, nullptr}, miss{1, 0, nullptr}, hit{2, 0, nullptr};
-        RtrSbtInfo sbt_info{1, &raygen, 1, &miss, 1, &hit, 0, nullptr};
-        RtrSbtLayout table;
-        EXPECT_EQ(rtrGetSbtLayout(rtr, &sbt_info, &table), VK_SUCCESS);
-        Buffer sbt = scene.upload(nullptr, table.size);
-        EXPECT_EQ(rtrWriteSbt(rtr, pipeline, &sbt_info, &table, sbt.data), VK_SUCCESS);
-        const VkDeviceSize scratch_size = rtrGetLaunchScratchSize(rtr, pipeline, kRays, 1, 1, nullptr);
-        Buffer scratch = scene.upload(nullptr, scratch_size);
-        scene.run([&] {
-            auto rec = scene.recorder;
-            rtrCmdBindPipeline(rec, pipeline);
-            rtrCmdBindDescriptorSets(rec, 0, 1, &set, 0, nullptr);
-            rtrCmdSetHeap(rec, scene.heap);
-            if (scratch_size) rtrCmdSetLaunchScratch(rec, scratch.handle, 0, scratch_size);
-            EXPECT_EQ(rtrCmdTraceRays(rec, sbt.handle, table.raygen.offset, sbt.handle, table.miss.offset,
-                                      table.miss.stride, sbt.handle, table.hit.offset, table.hit.stride,
-                                      VK_NULL_HANDLE, 0, 0, kRays, 1, 1),
-                      VK_SUCCESS);
-        });
-        return {result.as<uint32_t>(), result.as<uint32_t>() + kRays};
+        RtrLaunchError error{};
+        return StagesTest::trace(scene, scene.heap, top, kRays, error);
     }
 };
 

@@ -1,6 +1,8 @@
 // Stages as SPIR-V words, an application's set, and pipelines made of them.
 #pragma once
 
+#include <algorithm>
+
 #include "rtc/runtime_compiler.h"
 
 #include "scene_util.h"
@@ -124,8 +126,16 @@ class StagesTest : public RuntimeTest {
     // Rays at x = 0.1, 2.1 and 4.1 into a top level, with this heap set; what they say is in `said`.
     RtrLaunchError trace(Scene& scene, RtrHeap heap, RtrAccelerationStructure top) {
         RtrLaunchError error{};
-        Buffer result = scene.upload(nullptr, 64);
-        memset(result.data, 0, 64);
+        const std::vector<uint32_t> words = trace(scene, heap, top, 3, error);
+        std::copy(words.begin(), words.end(), said);
+        return error;
+    }
+
+    // As many rays, and what each says.
+    std::vector<uint32_t> trace(Scene& scene, RtrHeap heap, RtrAccelerationStructure top, uint32_t rays,
+                                RtrLaunchError& error) {
+        Buffer result = scene.upload(nullptr, 4 * rays);
+        memset(result.data, 0, 4 * rays);
         EXPECT_EQ(rtrUpdateAccelerationStructureDescriptors(rtr, set, 0, 0, 1, &top, null_heap), VK_SUCCESS);
         VkDescriptorBufferInfo info{result.handle, 0, VK_WHOLE_SIZE};
         VkWriteDescriptorSet w{VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET};
@@ -141,7 +151,7 @@ class StagesTest : public RuntimeTest {
         EXPECT_EQ(rtrGetSbtLayout(rtr, &sbt_info, &table), VK_SUCCESS);
         Buffer sbt = scene.upload(nullptr, table.size);
         EXPECT_EQ(rtrWriteSbt(rtr, pipeline, &sbt_info, &table, sbt.data), VK_SUCCESS);
-        VkDeviceSize scratch_size = rtrGetLaunchScratchSize(rtr, pipeline, 3, 1, 1, nullptr);
+        VkDeviceSize scratch_size = rtrGetLaunchScratchSize(rtr, pipeline, rays, 1, 1, nullptr);
         Buffer scratch = scene.upload(nullptr, scratch_size);
         VkDescriptorBufferInfo place{};
         scene.run([&] {
@@ -152,14 +162,13 @@ class StagesTest : public RuntimeTest {
             if (scratch_size) rtrCmdSetLaunchScratch(rec, scratch.handle, 0, scratch_size);
             EXPECT_EQ(rtrCmdTraceRays(rec, sbt.handle, table.raygen.offset, sbt.handle, table.miss.offset,
                                       table.miss.stride, sbt.handle, table.hit.offset, table.hit.stride,
-                                      VK_NULL_HANDLE, 0, 0, 3, 1, 1),
+                                      VK_NULL_HANDLE, 0, 0, rays, 1, 1),
                       VK_SUCCESS);
             EXPECT_EQ(rtrGetLaunchCount(rec), 1u);
             EXPECT_EQ(rtrGetLaunchErrorLocation(rec, 0, &place), VK_SUCCESS);
         });
-        for (int i = 0; i < 3; i++) said[i] = result.as<uint32_t>()[i];
         rtrDecodeLaunchError(scene.control.as<uint32_t>(place.offset), &error);
-        return error;
+        return {result.as<uint32_t>(), result.as<uint32_t>() + rays};
     }
 
     rtcc_compiler_t compiler = nullptr;
